@@ -1,0 +1,341 @@
+"""The one schema of a study: what `config.yaml` may say, and the cells it stands for.
+
+Unknown keys and impossible values are refused with a one-line `ConfigError`. The module imports neither torch nor
+numpy, so that Snakemake builds its graph of jobs fast.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from decimal import Decimal
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    ValidationError,
+    model_validator,
+)
+
+RESERVED_FOLDERS = frozenset({"benchmarks", "logs", "media", "notebooks", "tables"})
+
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$", max_length=40)]
+Count = Annotated[int, Field(ge=1, le=10**12)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class ConfigError(ValueError):
+    """A setting is missing, unknown or impossible; the message is one line: key, value, what is allowed."""
+
+
+class Settings(BaseModel):
+    """Base of all settings: immutable, no unknown keys, no silent conversion of types, only finite numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            for key, value in data.items():
+                if key not in cls.model_fields:
+                    allowed = ", ".join(cls.model_fields)
+                    raise ValueError(f"{key} = {_short(value)} is no known key; allowed: {allowed}")
+        return data
+
+
+class Environment(Settings):
+    """What surrounds Reacher-v5: the weight of the control cost, and whether actions are clipped to [-1, 1]."""
+
+    control_weight: NonNegative = 0.1
+    clip_actions: bool = False
+
+
+class PPO(Settings):
+    """Proximal policy optimisation (Schulman et al. 2017); defaults are the paper's, silences filled as in config.yaml."""
+
+    learning_rate: Positive = 3e-4
+    discount: Annotated[float, Field(gt=0, le=1)] = 0.99
+    gae_lambda: Fraction = 0.95
+    clip_range: Positive = 0.2
+    minibatch_size: Count = 64
+    rollout_steps: Annotated[int, Field(ge=2, le=10**6)] = 2048
+    epochs: Annotated[int, Field(ge=1, le=1000)] = 10
+    value_coefficient: NonNegative = 0.5
+    entropy_coefficient: NonNegative = 0.01
+    max_gradient_norm: Positive = 0.5
+    adam_epsilon: Positive = 1e-8
+    hidden_units: Annotated[int, Field(ge=1, le=4096)] = 64
+
+    @model_validator(mode="after")
+    def _minibatches_fill_the_rollout(self) -> Self:
+        if self.rollout_steps % self.minibatch_size:
+            raise ValueError(f"minibatch_size = {self.minibatch_size} must divide rollout_steps = {self.rollout_steps}")
+        return self
+
+
+class Shaping(Settings):
+    """How the shaping reward is formed, and what holds at the last step of an episode."""
+
+    form: Literal["paper", "dynamic"] = "paper"
+    episode_end: Literal["terminal", "bootstrap"] = "terminal"
+    terminal_potential: Literal["keep", "zero"] = "keep"
+
+
+class Protocol(Settings):
+    """A named, complete set of environment and algorithm choices."""
+
+    name: Name
+    environment: Environment = Environment()
+    ppo: PPO = PPO()
+    shaping: Shaping = Shaping()
+
+
+class Variant(Settings):
+    """One shaping rule: a potential and the schedule of its weight; `horizon` is in environment steps."""
+
+    name: Name
+    potential: Literal["none", "l2", "l2sq"]
+    schedule: Literal["constant", "linear"] = "constant"
+    horizon: Count | None = None
+
+    @model_validator(mode="after")
+    def _schedule_is_complete(self) -> Self:
+        if self.schedule == "linear" and self.horizon is None:
+            raise ValueError("horizon is missing; schedule = 'linear' needs a number of environment steps >= 1")
+        if self.schedule == "constant" and self.horizon is not None:
+            raise ValueError(f"horizon = {self.horizon} has no meaning with schedule = 'constant'; leave it out")
+        if self.potential == "none" and self.schedule != "constant":
+            raise ValueError(
+                f"schedule = {self.schedule!r} has no meaning with potential = 'none'; allowed: 'constant'"
+            )
+        return self
+
+
+class Cell(Settings):
+    """Protocol x variant x budget x alpha0, plus the root of its random streams: all that determines its training.
+
+    `budget` is in environment steps; `alpha0` is the shaping weight at t = 0.
+    """
+
+    protocol: Protocol
+    variant: Variant
+    budget: Count
+    alpha0: Positive = 1.0
+    root_seed: Seed = 0
+
+    @model_validator(mode="after")
+    def _budget_and_alpha0_are_possible(self) -> Self:
+        if self.budget < self.protocol.ppo.rollout_steps:
+            raise ValueError(
+                f"budget = {self.budget} is below one rollout; allowed: >= {self.protocol.ppo.rollout_steps}"
+            )
+        if self.variant.potential == "none" and self.alpha0 != 1:
+            raise ValueError(f"alpha0 = {self.alpha0} has no meaning with variant '{self.variant.name}'; allowed: 1")
+        return self
+
+    @property
+    def folder(self) -> str:
+        """Relative folder of the cell's files, e.g. `paper/l2/500000/alpha0.5`."""
+        return f"{self.protocol.name}/{self.variant.name}/{self.budget}/alpha{plain(self.alpha0)}"
+
+    @property
+    def name(self) -> str:
+        """The folder as one word, e.g. `paper-l2-500000-alpha0.5`: the cell's name in lists and file names."""
+        return self.folder.replace("/", "-")
+
+    @property
+    def iterations(self) -> int:
+        """Rollouts of the run: the budget rounded up to whole rollouts, ceil(budget / rollout_steps)."""
+        return -(-self.budget // self.protocol.ppo.rollout_steps)
+
+    @property
+    def key(self) -> dict[str, str | int | float]:
+        """The columns that name the cell in every study-wide table."""
+        return {
+            "protocol": self.protocol.name,
+            "variant": self.variant.name,
+            "budget": self.budget,
+            "alpha0": self.alpha0,
+        }
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that determines the cell's training, as plain JSON-able values with sorted keys."""
+        return _sorted(self.model_dump(mode="json"))
+
+
+class Evaluation(Settings):
+    """Evaluation of every trained policy: episodes a run and mode; `radius` of success in m."""
+
+    episodes: Annotated[int, Field(ge=1, le=10**6)] = 1000
+    radius: Positive = 0.02
+
+
+class Row(Settings):
+    """One row of the grid: every variant x budget x alpha0, with optional changes to the protocol's settings."""
+
+    protocol: Name = "paper"
+    variants: Annotated[tuple[Name, ...], Field(min_length=1)]
+    budgets: Annotated[tuple[Count, ...], Field(min_length=1)]
+    alpha0: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0,)
+    environment: dict[str, Any] = {}
+    ppo: dict[str, Any] = {}
+    shaping: dict[str, Any] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lists_to_tuples(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        return {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
+
+
+def _named(entries: Any) -> Any:
+    """Give each entry of a mapping its key as `name`."""
+    if not isinstance(entries, Mapping):
+        return entries
+    return {
+        key: {"name": key, **entry} if isinstance(entry, Mapping) and "name" not in entry else entry
+        for key, entry in entries.items()
+    }
+
+
+class Study(Settings):
+    """All cells of a configuration, and how they are trained, evaluated and shown."""
+
+    root_seed: Seed
+    seeds: Annotated[int, Field(ge=1, le=10**5)]
+    seeds_per_block: Annotated[int, Field(ge=1, le=1000)]
+    protocols: Annotated[dict[Name, Protocol], BeforeValidator(_named), Field(min_length=1)]
+    variants: Annotated[dict[Name, Variant], BeforeValidator(_named), Field(min_length=1)]
+    grid: Annotated[
+        tuple[Row, ...], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v), Field(min_length=1)
+    ]
+    evaluation: Evaluation
+
+    @model_validator(mode="after")
+    def _grid_is_possible(self) -> Self:
+        for entries, kind in ((self.protocols, "protocols"), (self.variants, "variants")):
+            for name, entry in entries.items():
+                if entry.name != name:
+                    raise ValueError(f"{kind}.{name}.name = {entry.name!r} must equal its key; leave it out")
+        for name in self.protocols:
+            if name in RESERVED_FOLDERS:
+                raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
+        names = [cell.name for cell in self.cells]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"grid: cell {name} is there {names.count(name)} times; allowed: once")
+        return self
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """The cells in the order of the grid."""
+        return tuple(cell for number, row in enumerate(self.grid) for cell in self._cells_of(number, row))
+
+    def _cells_of(self, number: int, row: Row) -> list[Cell]:
+        where = f"grid.{number}"
+        if row.protocol not in self.protocols:
+            raise ValueError(f"{where}.protocol = {row.protocol!r} is unknown; allowed: {', '.join(self.protocols)}")
+        for variant in row.variants:
+            if variant not in self.variants:
+                raise ValueError(f"{where}.variants = {variant!r} is unknown; allowed: {', '.join(self.variants)}")
+        protocol = self.protocols[row.protocol].model_dump()
+        for part in ("environment", "ppo", "shaping"):
+            protocol[part] |= getattr(row, part)
+        try:
+            changed = Protocol.model_validate(protocol)
+            return [
+                Cell(
+                    protocol=changed,
+                    variant=self.variants[variant],
+                    budget=budget,
+                    alpha0=alpha0,
+                    root_seed=self.root_seed,
+                )
+                for variant, budget, alpha0 in product(row.variants, row.budgets, row.alpha0)
+            ]
+        except ValidationError as error:
+            raise ValueError(f"{where}.{_one_line(error)}".replace("..", ".")) from None
+
+    def blocks(self) -> tuple[range, ...]:
+        """Consecutive ranges of run seeds that train together; more seeds leave every full block as it is."""
+        size = self.seeds_per_block
+        return tuple(range(first, min(first + size, self.seeds)) for first in range(0, self.seeds, size))
+
+
+def block_name(seeds: range) -> str:
+    """Folder of one seed block, e.g. `seeds0-9`."""
+    return f"seeds{seeds[0]}-{seeds[-1]}"
+
+
+def load_study(source: Mapping[str, Any] | Path | str) -> Study:
+    """Read and validate a study.
+
+    source: the path of a YAML file, or the mapping that such a file holds.
+    Raises ConfigError, a single line, for the first thing that is wrong.
+    """
+    if isinstance(source, Mapping):
+        return _validated(source, "config")
+    try:
+        content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ConfigError(f"{source}: cannot be read as YAML: {' '.join(str(error).split())}") from None
+    return _validated(content, str(source))
+
+
+def plain(number: float) -> str:
+    """A number in the shortest plain notation, without exponent or trailing zeros: 1.0 -> `1`, 0.5 -> `0.5`."""
+    return format(Decimal(repr(number)).normalize(), "f")
+
+
+def _validated(content: Any, source: str) -> Study:
+    keys = ", ".join(Study.model_fields)
+    if content is None or content == {}:
+        raise ConfigError(f"{source}: is empty; allowed: a mapping with the keys {keys}")
+    if not isinstance(content, Mapping):
+        raise ConfigError(f"{source}: = {_short(content)} is not a mapping; allowed: a mapping with the keys {keys}")
+    try:
+        return Study.model_validate(dict(content))
+    except ValidationError as error:
+        raise ConfigError(f"{source}: {_one_line(error)}") from None
+
+
+def _one_line(error: ValidationError) -> str:
+    """The first problem as `key = value: what is allowed`."""
+    problem = error.errors(include_url=False)[0]
+    key = ".".join(str(part) for part in problem["loc"] if part != "[key]")
+    if problem["type"] == "missing":
+        return f"{key} is missing"
+    if problem["type"] == "value_error":  # raised by a validator here, with key and value in its own words
+        message = str(problem["ctx"]["error"])
+        return f"{key}.{message}" if key else message
+    return f"{key} = {_short(problem['input'])}: {_allowed(problem['msg'])}"
+
+
+def _allowed(message: str) -> str:
+    """pydantic's message in the words of YAML."""
+    message = re.sub(r"^(Input|Value|String|Dictionary|Tuple) (?=should)", "", message)
+    return message.replace("valid tuple", "list").split(" after validation")[0].split(" or instance of")[0]
+
+
+def _short(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _sorted(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    return value
