@@ -63,7 +63,7 @@ class Environment(Settings):
 
 
 class PPO(Settings):
-    """Proximal policy optimisation (Schulman et al. 2017); defaults are the paper's, silences filled as in config.yaml."""
+    """Proximal policy optimisation (Schulman et al. 2017); the defaults are the paper's, as in config.yaml."""
 
     learning_rate: Positive = 3e-4
     discount: Annotated[float, Field(gt=0, le=1)] = 0.99
@@ -172,7 +172,8 @@ class Cell(Settings):
 
     def settings(self) -> dict[str, Any]:
         """Everything that determines the cell's training, as plain JSON-able values with sorted keys."""
-        return _sorted(self.model_dump(mode="json"))
+        settings: dict[str, Any] = _sorted(self.model_dump(mode="json"))
+        return settings
 
 
 class Evaluation(Settings):
@@ -325,7 +326,7 @@ def _one_line(error: ValidationError) -> str:
 
 
 def _allowed(message: str) -> str:
-    """pydantic's message in the words of YAML."""
+    """Pydantic's message in the words of YAML."""
     message = re.sub(r"^(Input|Value|String|Dictionary|Tuple) (?=should)", "", message)
     return message.replace("valid tuple", "list").split(" after validation")[0].split(" or instance of")[0]
 
