@@ -1,0 +1,97 @@
+"""Made-up tables with the columns of the study's, for tests of what is drawn and written from them."""
+
+import numpy as np
+import pandas as pd
+
+MAIN = ("none", "l2", "l2sq", "decay200k", "decay300k", "decay500k")
+L2SQ = ("decay200k_l2sq", "decay300k_l2sq", "decay500k_l2sq")
+CELL = ["protocol", "variant", "budget", "alpha0"]
+PAPER_GRID = [
+    *[("paper", variant, budget, 1.0) for variant in MAIN for budget in (500_000, 1_000_000)],
+    *[("paper", variant, 500_000, 0.5) for variant in MAIN[1:]],
+    *[("paper", variant, budget, 0.5) for variant in L2SQ for budget in (500_000, 1_000_000)],
+]
+TOY_GRID = [("paper", variant, 4096, 1.0) for variant in ("none", "l2", "decay200k")]
+MEASURES = (
+    "success_rate", "mean_return", "final_success_rate", "final_distance", "min_distance",
+    "reward_distance", "reward_control", "first_hit_step",
+)  # fmt: skip
+
+
+def runs(grid, seeds=10):
+    """A row per run, as `runs.parquet` has it."""
+    generator = np.random.default_rng(1)
+    rows = []
+    for key in grid:
+        for seed in range(seeds):
+            success = float(np.clip(generator.normal(0.28, 0.07), 0, 1))
+            distance, control = -generator.uniform(5, 8), -generator.uniform(2, 6)
+            row = dict(zip(CELL, key, strict=True), seed=seed, episodes=1000, success_rate=success)
+            row |= {"mean_return": distance + control, "reward_distance": distance, "reward_control": control}
+            row |= {"final_success_rate": success / 3, "final_distance": generator.uniform(0.02, 0.1)}
+            row |= {"min_distance": generator.uniform(0.01, 0.03), "first_hit_step": generator.uniform(10, 30)}
+            row |= {f"deterministic_{name}": row[name] for name in MEASURES}
+            row |= {"peak_return": -9.0, "peak_iteration": 200, "final_return": -10.0, "diverged": False}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def cells(grid, seeds=10):
+    """A row per cell, as `cells.parquet` has it."""
+    rows = []
+    for key, part in runs(grid, seeds).groupby(CELL, sort=False):
+        row = dict(zip(CELL, key, strict=True), seeds=seeds, diverged=0, interval="95 % bootstrap over seeds")
+        for name in MEASURES:
+            mean, spread = part[name].mean(), 2 * part[name].std(ddof=0) / np.sqrt(seeds)
+            row |= {name: mean, f"{name}_iqm": mean, f"{name}_low": mean - spread, f"{name}_high": mean + spread}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def progress(grid, seeds=10):
+    """All progress tables in one, with the cell's key added."""
+    generator = np.random.default_rng(2)
+    parts = []
+    for key in grid:
+        iteration = np.arange(1, -(-key[2] // 2048) + 1)
+        for seed in range(seeds):
+            noise = generator.normal(0, 1.5, iteration.size)
+            curve = -10 - 45 * np.exp(-iteration / 30) - generator.gamma(2.0, 1.0) + noise
+            rows = {"seed": seed, "iteration": iteration, "env_steps": 2048 * iteration, "episode_return": curve}
+            parts.append(pd.DataFrame(dict(zip(CELL, key, strict=True)) | rows))
+    return pd.concat(parts, ignore_index=True)
+
+
+def correlation(r=(0.1, 0.91, 0.03, 0.37, 0.3, -0.2)):
+    """Pearson and Spearman coefficients of every pair, as `correlation.csv` has them."""
+    names = ("alpha0", "success_rate", "mean_return", "budget")
+    pairs = [(x, y) for i, x in enumerate(names) for y in names[i + 1 :]]
+    rows = [
+        {"method": method, "x": x, "y": y, "r": value, "ci_low": value - 0.2, "ci_high": value + 0.05, "n": 17,
+         "level": level, "protocol": "paper"}
+        for method in ("pearson", "spearman")
+        for level in ("cells", "runs")
+        for (x, y), value in zip(pairs, r, strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def claims():
+    """One claim of each verdict, as `claims.csv` has them."""
+    rows = [
+        ("C1", "Shaping improves success over none", "Table 2", 0.01, -0.02, 0.04, "inconclusive"),
+        ("C3", "Decay beats constant shaping", "Table 2", -0.06, -0.10, -0.02, "not reproduced"),
+        ("C18", "PPO often fails to reach the target", "Sec. 1", 0.28, 0.24, 0.32, "reproduced"),
+        ("C19", "SAC and TD3 do better than PPO", "cited, not run", np.nan, np.nan, np.nan, "untestable"),
+    ]
+    frame = pd.DataFrame(rows, columns=["id", "claim", "published", "measured", "ci_low", "ci_high", "verdict"])
+    frame.insert(6, "test", "paired difference over seeds")
+    return frame
+
+
+def controllers():
+    """Policies that need no learning."""
+    names = ("zero action", "uniform random", "unit Gaussian", "inverse kinematics + PD")
+    return pd.DataFrame(
+        {"controller": names, "success_rate": (0.002, 0.17, 0.2, 1.0), "mean_return": (-11.8, -42.8, -109.0, -3.7)}
+    )
