@@ -1,0 +1,321 @@
+"""The only reader and writer of the study's files.
+
+Every file is written to a temporary name beside its target, flushed to disk and renamed, so a reader never meets half
+a file. Every table has a fixed schema that is checked when it is written and again when it is read. Equal content
+gives equal bytes; what varies from run to run (times, machine) is in the manifests alone.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import io
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+POLICY_FORMAT = 1
+SECONDS_PER_STEP = 0.02  # simulated time of one environment step: two MuJoCo steps of 0.01 s
+
+INTEGER, NUMBER, TEXT, FLAG = pa.int64(), pa.float64(), pa.string(), pa.bool_()
+
+
+class ArtifactError(RuntimeError):
+    """A file is missing, damaged or not what its name says; the message names it and how to repair it."""
+
+    def __init__(self, path: Path | str, problem: str, repair: str = "delete it and run snakemake again"):
+        super().__init__(f"{path}: {problem}; {repair}")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of a table and their types. `optional` columns may hold missing values.
+
+    With `measures`, further columns are allowed; they are numbers, missing where there is no value.
+    """
+
+    columns: Mapping[str, pa.DataType]
+    optional: frozenset[str] = frozenset()
+    measures: bool = False
+
+    def schema(self, names: Sequence[str]) -> pa.Schema:
+        """The arrow schema for a table with these column names. Raises ValueError where they do not fit."""
+        missing = [name for name in self.columns if name not in names]
+        unknown = [name for name in names if name not in self.columns]
+        if missing:
+            raise ValueError(f"column {', '.join(missing)} is missing")
+        if unknown and not self.measures:
+            raise ValueError(f"unknown column {', '.join(unknown)}")
+        if len(set(names)) != len(names):
+            raise ValueError("a column is there twice")
+        return pa.schema(
+            [
+                pa.field(name, self.columns.get(name, NUMBER), nullable=name in unknown or name in self.optional)
+                for name in names
+            ]
+        )
+
+
+_CELL = {"protocol": TEXT, "variant": TEXT, "budget": INTEGER, "alpha0": NUMBER}
+_PROGRESS_NUMBERS = (
+    "episode_return",
+    "shaped_return",
+    "episode_length",
+    "success_rate",
+    "final_distance",
+    "action_std",
+    "entropy",
+    "approx_kl",
+    "clip_fraction",
+    "policy_loss",
+    "value_loss",
+    "explained_variance",
+)
+_EPISODE_NUMBERS = ("episode_return", "reward_distance", "reward_control", "min_distance", "final_distance")
+
+PROGRESS = Table(
+    {"seed": INTEGER, "iteration": INTEGER, "env_steps": INTEGER, **dict.fromkeys(_PROGRESS_NUMBERS, NUMBER)},
+    optional=frozenset(_PROGRESS_NUMBERS),
+)
+EPISODES = Table(
+    {
+        "seed": INTEGER,
+        "mode": TEXT,
+        "episode": INTEGER,
+        **dict.fromkeys(_EPISODE_NUMBERS, NUMBER),
+        "first_hit_step": INTEGER,
+        "success": FLAG,
+        "final_success": FLAG,
+    },
+    optional=frozenset({"first_hit_step", *_EPISODE_NUMBERS}),
+)
+RUNS = Table({**_CELL, "seed": INTEGER, "episodes": INTEGER, "diverged": FLAG}, measures=True)
+CELLS = Table({**_CELL, "seeds": INTEGER, "diverged": INTEGER, "interval": TEXT}, measures=True)
+CORRELATION = Table(
+    {"method": TEXT, "x": TEXT, "y": TEXT, "r": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER, "n": INTEGER}
+    | {"level": TEXT, "protocol": TEXT},
+    optional=frozenset({"r", "ci_low", "ci_high"}),
+)
+CLAIMS = Table(
+    dict.fromkeys(("id", "claim", "published"), TEXT)
+    | dict.fromkeys(("measured", "ci_low", "ci_high"), NUMBER)
+    | dict.fromkeys(("test", "verdict"), TEXT),
+    optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
+)
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """Give a temporary path beside `path`; put what was written there in place of `path` if nothing was raised."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path | str, content: bytes) -> None:
+    """Write a file atomically."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_text(path: Path | str, content: str) -> None:
+    """Write a UTF-8 text file atomically."""
+    write_bytes(path, content.encode())
+
+
+def sha256(path: Path | str) -> str:
+    """The checksum of a file, or of a folder's file names and contents, as hexadecimal text."""
+    path = Path(path)
+    if path.is_dir():
+        parts = [f"{part.relative_to(path)} {sha256(part)}\n" for part in sorted(path.rglob("*")) if part.is_file()]
+        return hashlib.sha256("".join(parts).encode()).hexdigest()
+    try:
+        with path.open("rb") as content:
+            return hashlib.file_digest(content, "sha256").hexdigest()
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror})") from None
+
+
+def write_json(path: Path | str, content: Mapping[str, Any]) -> None:
+    """Write a mapping as JSON with sorted keys."""
+    write_text(path, json.dumps(content, indent=2, sort_keys=True) + "\n")
+
+
+def read_json(path: Path | str) -> dict[str, Any]:
+    """Read a mapping. Raises ArtifactError."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise ArtifactError(path, f"is no JSON ({error})") from None
+    if not isinstance(content, dict):
+        raise ArtifactError(path, "is no JSON mapping")
+    return content
+
+
+def write_table(path: Path | str, frame: pd.DataFrame, table: Table) -> None:
+    """Write a table as parquet or CSV, by the path's suffix. Raises ValueError where it does not fit its schema."""
+    path = Path(path)
+    arrow = _to_arrow(frame, table, path)
+    if path.suffix == ".csv":
+        write_text(path, arrow.to_pandas(types_mapper=_nullable).to_csv(index=False, lineterminator="\n"))
+        return
+    with replacing(path) as temporary:
+        pq.write_table(arrow, temporary, compression="zstd")
+
+
+def read_table(path: Path | str, table: Table) -> pd.DataFrame:
+    """Read a table; missing values, also of integers, come as NaN. Raises ArtifactError."""
+    path = Path(path)
+    try:
+        if path.suffix == ".csv":
+            frame = pd.read_csv(path, float_precision="round_trip", keep_default_na=False, na_values=[""])
+            arrow = _to_arrow(frame, table, path)
+        else:
+            arrow = pq.read_table(path)
+            if not arrow.schema.equals(table.schema(arrow.column_names)):
+                raise ValueError("a column has another type")
+        content: pd.DataFrame = arrow.to_pandas()
+        return content
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror or error})") from None
+    except (ValueError, pa.ArrowException) as error:
+        raise ArtifactError(path, f"is not the expected table ({' '.join(str(error).split())})") from None
+
+
+def write_policy(
+    path: Path | str, seeds: Sequence[int], weights: Mapping[str, Tensor], settings: Mapping[str, Any]
+) -> None:
+    """Write S trained policies, each weight stacked over [S]eeds, for `torch.load(weights_only=True)`."""
+    import torch
+
+    content = {
+        "format": POLICY_FORMAT,
+        "seeds": torch.tensor(list(seeds), dtype=torch.int64),
+        "weights": {name: weights[name].detach().clone().contiguous() for name in sorted(weights)},
+        "settings": json.dumps(settings, sort_keys=True),
+    }
+    buffer = io.BytesIO()  # not the path: torch stores a file's name in it
+    torch.save(content, buffer)
+    write_bytes(path, buffer.getvalue())
+
+
+@dataclass(frozen=True)
+class PolicyFile:
+    """What a `policy.pt` holds: run seeds, weights stacked over [S]eeds, and the settings of the training."""
+
+    seeds: list[int]
+    weights: dict[str, Tensor]
+    settings: dict[str, Any]
+
+
+def read_policy(path: Path | str) -> PolicyFile:
+    """Read a `policy.pt` without executing anything in it. Raises ArtifactError."""
+    content = load_tensors(path)
+    try:
+        if content["format"] != POLICY_FORMAT:
+            raise ValueError(f"format {content['format']} is unknown")
+        seeds = [int(seed) for seed in content["seeds"]]
+        weights = dict(content["weights"])
+        if any(len(weight) != len(seeds) for weight in weights.values()):
+            raise ValueError("weights and seeds differ in number")
+        return PolicyFile(seeds, weights, json.loads(content["settings"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError(path, f"is no policy file of this project ({error!r})") from None
+
+
+def load_tensors(path: Path | str) -> dict[str, Any]:
+    """Load a dict saved by torch, tensors and plain values only: a file with pickled code is refused.
+
+    Raises ArtifactError.
+    """
+    import torch
+
+    try:
+        content = torch.load(path, map_location="cpu", weights_only=True)
+    except FileNotFoundError:
+        raise ArtifactError(path, "does not exist", "check the path") from None
+    except Exception as error:  # torch raises whatever its unpickler and zip reader meet in a damaged file
+        problem = str(error).split("\n", 1)[0][:200]
+        raise ArtifactError(path, f"is no file of plain tensors ({problem})", "nothing in it was executed") from None
+    if not isinstance(content, dict):
+        raise ArtifactError(path, "holds no dict of tensors", "nothing in it was executed")
+    return content
+
+
+def write_monitors(folder: Path | str, episodes: pd.DataFrame) -> None:
+    """Write one `<seed>.monitor.csv` per run, as Stable-Baselines3's Monitor does: episode return, length and time.
+
+    episodes: a row per training episode, in order, columns `seed, episode_return, episode_length, env_steps`
+    (`env_steps`: environment steps of the run up to the episode's end). The time column is simulated seconds, so
+    that equal runs give equal files.
+    """
+    header = json.dumps({"t_start": 0.0, "env_id": "Reacher-v5"})
+    for seed, run in episodes.groupby("seed"):
+        rows = zip(run["episode_return"], run["episode_length"], run["env_steps"], strict=True)
+        lines = [f"{value:.6f},{length:.0f},{steps * SECONDS_PER_STEP:.2f}" for value, length, steps in rows]
+        write_text(Path(folder) / f"{seed}.monitor.csv", "\n".join([f"#{header}", "r,l,t", *lines, ""]))
+
+
+@contextmanager
+def exclusive(path: Path | str) -> Iterator[bool]:
+    """Hold the lock file `path`, waiting for another process that has it; it is free again when its holder dies.
+
+    Gives whether there was a wait.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as lock:
+        waited = False
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            waited = True
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield waited
+
+
+def _to_arrow(frame: pd.DataFrame, table: Table, path: Path) -> pa.Table:
+    try:
+        schema = table.schema(list(frame.columns))
+        arrow = pa.Table.from_pandas(frame, schema=schema, preserve_index=False).replace_schema_metadata(None)
+        arrow.validate(full=True)
+    except (ValueError, TypeError, pa.ArrowException) as error:
+        raise ValueError(f"{path.name}: {' '.join(str(error).split())}") from None
+    for name in schema.names:
+        if not schema.field(name).nullable and arrow[name].null_count:
+            raise ValueError(f"{path.name}: column {name} has missing values")
+    return arrow
+
+
+def _nullable(kind: pa.DataType) -> Any:
+    return pd.Int64Dtype() if kind == INTEGER else None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

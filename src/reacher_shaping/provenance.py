@@ -1,0 +1,177 @@
+"""Where a result comes from: the code that made it, the repository's state, the machine.
+
+`code_hash` answers one question for the workflow: would this script compute anything else than before? It looks at
+the script and at the definitions of the package that the script reaches, not at whole files. So an edit of a plot
+never retrains, and a comment, a docstring, a line break or an unrelated definition reruns nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import os
+import platform
+import subprocess
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+PACKAGE = __package__ or "reacher_shaping"
+VERSIONED = ("torch", "mujoco", "gymnasium", "numpy", "pandas", "pyarrow", "scipy", "matplotlib", "snakemake")
+
+WHOLE = "*"  # in place of a definition's name: all definitions of its module
+
+Definition = tuple[str, str]  # (module, name)
+
+
+def code_hash(script: Path | str) -> str:
+    """Hash of the code that a Python script runs in itself and in this package, as hexadecimal text.
+
+    Found by reading, not by running: names reached through `getattr` or `import_module` are not seen. Raises
+    SyntaxError or OSError for a script that cannot be read.
+    """
+    code = reachable_code(Path(script))
+    return hashlib.sha256("\n".join(f"{where}: {code[where]}" for where in sorted(code)).encode()).hexdigest()
+
+
+def reachable_code(script: Path) -> dict[str, str]:
+    """Source without comments, docstrings and layout of the script and of every definition of the package it reaches.
+
+    Keys are `script` and `module.name`; statements of a reached module that define no name stand under `module.`.
+    """
+    start = _Source(script)
+    code = {"script": _normalised(start.tree)}
+    waiting = start.references(start.tree)
+    while waiting:
+        module, name = waiting.pop()
+        source = _source(module)
+        names = source.definitions if name == WHOLE else {name, ""} & source.definitions.keys()
+        for found in names:
+            if f"{module}.{found}" not in code:
+                nodes = source.definitions[found]
+                code[f"{module}.{found}"] = "\n".join(map(_normalised, nodes))
+                waiting |= {reference for node in nodes for reference in source.references(node, module)}
+        waiting |= {source.imports[name]} if name in source.imports else set()
+    return code
+
+
+def git_state(folder: Path | str) -> dict[str, Any]:
+    """Commit of the repository at `folder` and whether files differ from it; None where there is no repository."""
+
+    def git(*arguments: str) -> str | None:
+        command = ["git", "-C", str(folder), *arguments]
+        try:
+            return subprocess.run(command, capture_output=True, text=True, check=True, timeout=30).stdout.strip()
+        except (OSError, subprocess.SubprocessError):
+            return None
+
+    status = git("status", "--porcelain")
+    return {"commit": git("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    return {"python": platform.python_version(), PACKAGE: metadata.version(PACKAGE)} | {
+        name: metadata.version(name) for name in VERSIONED
+    }
+
+
+def machine() -> dict[str, Any]:
+    """CPU model, number of cores this process may use, and system."""
+    return {"cpu": _cpu(), "cores": len(os.sched_getaffinity(0)), "system": f"{platform.system()} {platform.release()}"}
+
+
+class _Source:
+    """One parsed file: its definitions by name (statements that define none under ""), its imports of the package."""
+
+    def __init__(self, path: Path):
+        self.tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+        self.imports: dict[str, Definition] = {}
+        self.definitions: dict[str, list[ast.stmt]] = {}
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                self._add_import(node)
+        for statement in self.tree.body:
+            if not isinstance(statement, ast.Import | ast.ImportFrom):
+                for name in _names(statement) or [""]:
+                    self.definitions.setdefault(name, []).append(statement)
+
+    def _add_import(self, node: ast.Import | ast.ImportFrom) -> None:
+        for alias in node.names:
+            name = alias.asname or alias.name
+            origin = alias.name if isinstance(node, ast.Import) else f"{'.' * node.level}{node.module or ''}"
+            origin = f"{PACKAGE}.{origin.lstrip('.')}".rstrip(".") if origin.startswith(".") else origin
+            if origin.split(".")[0] != PACKAGE:
+                continue
+            module = origin.removeprefix(PACKAGE).removeprefix(".")
+            if isinstance(node, ast.Import):
+                self.imports[name.split(".")[0]] = (module, WHOLE)
+            elif not module:
+                self.imports[name] = (alias.name, WHOLE) if _path(alias.name).exists() else ("__init__", alias.name)
+            else:
+                self.imports[name] = (module, alias.name)
+
+    def references(self, node: ast.AST, module: str = "") -> set[Definition]:
+        """Definitions that a piece of this file names: its own (if it is `module`), imported, or `imported.name`."""
+        found: set[Definition] = set()
+        inside = set()
+        for part in ast.walk(node):
+            if isinstance(part, ast.Attribute) and isinstance(part.value, ast.Name):
+                origin = self.imports.get(part.value.id)
+                if origin and origin[1] == WHOLE:
+                    found.add((origin[0], part.attr))
+                    inside.add(part.value)
+        for part in ast.walk(node):
+            if isinstance(part, ast.Name) and part not in inside:
+                if part.id in self.imports:
+                    found.add(self.imports[part.id])
+                elif module and part.id in self.definitions:
+                    found.add((module, part.id))
+        return found
+
+
+@cache
+def _source(module: str) -> _Source:
+    return _Source(_path(module))
+
+
+def _path(module: str) -> Path:
+    return Path(__file__).parent / f"{module.replace('.', '/')}.py"
+
+
+def _names(statement: ast.stmt) -> list[str]:
+    """Names that a top-level statement defines."""
+    if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return [statement.name]
+    if isinstance(statement, ast.Assign | ast.AnnAssign):
+        targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+        return [part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)]
+    return []
+
+
+def _normalised(node: ast.AST) -> str:
+    """Source of a node without comments, layout and docstrings."""
+    copy = ast.parse(ast.unparse(node))
+    for part in ast.walk(copy):
+        body = getattr(part, "body", None)
+        if isinstance(body, list):
+            body[:] = [line for line in body if not _is_text(line)] or [ast.Pass()]
+    return ast.unparse(copy)
+
+
+def _is_text(statement: ast.stmt) -> bool:
+    """Whether a statement is a bare string: a docstring, or a comment in a string's clothes."""
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
+
+
+def _cpu() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
