@@ -1,7 +1,13 @@
 """Made-up tables with the columns of the study's, for tests of what is drawn and written from them."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
+
+from reacher_shaping import tables
+
+PUBLISHED = Path(__file__).parents[1] / "report" / "published"
 
 MAIN = ("none", "l2", "l2sq", "decay200k", "decay300k", "decay500k")
 L2SQ = ("decay200k_l2sq", "decay300k_l2sq", "decay500k_l2sq")
@@ -95,3 +101,8 @@ def controllers():
     return pd.DataFrame(
         {"controller": names, "success_rate": (0.002, 0.17, 0.2, 1.0), "mean_return": (-11.8, -42.8, -109.0, -3.7)}
     )
+
+
+def published():
+    """The paper's tables under our cell keys."""
+    return tables.published_cells(*(pd.read_csv(PUBLISHED / name) for name in ("table2.csv", "table3.csv")))

@@ -49,7 +49,7 @@ def figure_2(
     panels[0].set_ylim(bottom=0)
     if controllers is not None and not controllers.empty:
         _draw_controllers(list(panels), controllers)
-    panels[0].yaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0))
+    panels[0].yaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
     panels[0].set_ylabel("Success rate: tip within the radius\nat any step of an episode")
     _legend(figure, ours, shades)
     return figure
@@ -74,7 +74,9 @@ def _draw_bars(axes: Axes, cells: pd.DataFrame, published: pd.DataFrame, shades:
         value = theirs.get((cell["variant"], *setting))
         if value is not None:
             axes.plot(x, value, linestyle="none", label="_published", zorder=4, **PUBLISHED)
-    axes.set_xticks(range(len(variants)), [variant_label(name).replace(", ", "\n") for name in variants])
+    axes.set_xticks(
+        range(len(variants)), [variant_label(name).replace(",", "").replace(" ", "\n") for name in variants]
+    )
     axes.tick_params(axis="x", length=0)
     axes.grid(visible=False, axis="x")
 
@@ -99,10 +101,10 @@ def _draw_controllers(panels: list[Axes], controllers: pd.DataFrame) -> None:
         value = row["success_rate"]
         text = str(row["controller"])
         if value <= top:
-            for axes in panels:
+            for axes in (panel for panel in panels if panel.patches):
                 axes.axhline(value, color="#555555", linewidth=0.9, linestyle=":", label="_controller")
         else:
-            text += f" {value:.0%}, off the scale"
+            text += f"\n({100 * value:.0f} %, off the scale)"
         place = max(min(value, top), place + 0.042 * top)  # names keep a line's height between them
         panels[1].annotate(
             text,

@@ -26,6 +26,7 @@ from reacher_shaping.style import (
 
 __all__ = ["figure_1", "figure_2", "figure_3", "figure_4", "save"]
 
+NO_SETTING: Setting = (0, 1.0)
 MEASURES = {
     "alpha0": "α₀",
     "success_rate": "success\nrate",
@@ -43,13 +44,13 @@ def figure_1(curves: pd.DataFrame, protocol: str | None = None) -> Figure:
     """
     main = in_groups(of_protocol(curves, protocol), ("none", "constant", "decay"))
     rows = {"constant": "Constant shaping", "decay": "Decayed shaping"}
-    settings = settings_of(main) or [(0, 1.0)]
+    settings = settings_of(main) or [NO_SETTING]
     figure = Figure(figsize=(3.3 * len(settings) + 1.4, 6.0))
     panels = figure.subplots(2, len(settings), sharey="col", squeeze=False)
     for row, (family, title) in enumerate(rows.items()):
         for column, setting in enumerate(settings):
             part = _at(in_groups(main, ("none", family)), setting)
-            _draw_curves(panels[row, column], part, f"{title}\n{setting_label(*setting)}")
+            _draw_curves(panels[row, column], part, _title(title, setting))
         _label_curves(list(panels[row]))
     _explain_curves(figure, main)
     return figure
@@ -59,11 +60,11 @@ def figure_1(curves: pd.DataFrame, protocol: str | None = None) -> Figure:
 def figure_4(curves: pd.DataFrame, protocol: str | None = None) -> Figure:
     """Training curves of decay with the L2-squared potential, a panel per budget and alpha0."""
     part = in_groups(of_protocol(curves, protocol), ("decay_l2sq",))
-    settings = settings_of(part) or [(0, 1.0)]
+    settings = settings_of(part) or [NO_SETTING]
     figure = Figure(figsize=(3.9 * len(settings) + 1.6, 3.4))
     panels = figure.subplots(1, len(settings), sharey=True, squeeze=False)[0]
     for axes, setting in zip(panels, settings, strict=True):
-        _draw_curves(axes, _at(part, setting), f"Decay, L2²\n{setting_label(*setting)}")
+        _draw_curves(axes, _at(part, setting), _title("Decay, L2²", setting))
     _label_curves(list(panels))
     _explain_curves(figure, part)
     return figure
@@ -79,6 +80,10 @@ def _explain_curves(figure: Figure, curves: pd.DataFrame) -> None:
     band = "; bands: 95 % t interval of the mean" if several else ""
     text = f"Lines: mean over {count} seed{several}{band}; dashed: highest point of the mean curves"
     figure.supxlabel(text, fontsize=8, color="#555555")
+
+
+def _title(title: str, setting: Setting) -> str:
+    return title if setting == NO_SETTING else f"{title}\n{setting_label(*setting)}"
 
 
 def _at(frame: pd.DataFrame, setting: Setting) -> pd.DataFrame:

@@ -127,7 +127,7 @@ def of_protocol(frame: pd.DataFrame, protocol: str | None) -> pd.DataFrame:
 
 def in_groups(frame: pd.DataFrame, groups: Sequence[str]) -> pd.DataFrame:
     """The rows whose variant belongs to one of the groups."""
-    return frame[[group(variant) in groups for variant in frame["variant"]]]
+    return frame[frame["variant"].map(group).isin(list(groups))]
 
 
 def settings_of(frame: pd.DataFrame) -> list[Setting]:
