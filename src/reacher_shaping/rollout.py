@@ -8,15 +8,18 @@ not depend on each other: 2048 sequential steps are 40 episodes of 50 steps and 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from reacher_shaping.policy import Policy
 from reacher_shaping.reacher import ACTION_SIZE, EPISODE_STEPS, OBSERVATION_SIZE, Lanes, control_cost, draw_reset
 from reacher_shaping.streams import Purpose, stream
 
 Array = NDArray[np.float64]
+Stack = TypeVar("Stack", NDArray[Any], Tensor)
 
 
 @dataclass(frozen=True)
@@ -42,11 +45,6 @@ class Plan:
         return self.steps // EPISODE_STEPS
 
     @cached_property
-    def taken(self) -> NDArray[np.bool_]:
-        """[L, T] true where the sequential loop takes the step."""
-        return np.arange(EPISODE_STEPS) < self.lengths[:, None]
-
-    @cached_property
     def ends(self) -> NDArray[np.bool_]:
         """[L, T] true at each lane's last step."""
         return np.arange(EPISODE_STEPS) == self.lengths[:, None] - 1
@@ -55,6 +53,10 @@ class Plan:
     def order(self) -> NDArray[np.int64]:
         """[L, T] position of each step in the sequential rollout."""
         return np.arange(self.lanes)[:, None] * EPISODE_STEPS + np.arange(EPISODE_STEPS)
+
+    def sequence(self, values: Stack) -> Stack:
+        """Return the steps the sequential loop takes, [S, N, ...] in its order, of values [S, L, T, ...]."""
+        return values.reshape(len(values), self.lanes * EPISODE_STEPS, *values.shape[3:])[:, : self.steps]
 
 
 @dataclass(frozen=True)

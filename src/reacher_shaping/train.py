@@ -151,14 +151,13 @@ def prepare(
         plan.ends,
         discount=settings.discount,
         gae_lambda=settings.gae_lambda,
-    )[:, plan.taken]
-    fitted = values[..., :-1][:, plan.taken]
+    )
+    advantages, fitted = plan.sequence(advantages), plan.sequence(values[..., :-1])
     targets = advantages + fitted
-    taken = torch.from_numpy(plan.taken)
     records = ppo.pack(
-        features[:, taken],
-        torch.from_numpy(rollout.action)[:, taken],
-        log_prob[:, taken],
+        plan.sequence(features),
+        plan.sequence(torch.from_numpy(rollout.action)),
+        plan.sequence(log_prob),
         torch.from_numpy(advantage.normalise(advantages)).float(),
         torch.from_numpy(targets).float(),
     )
