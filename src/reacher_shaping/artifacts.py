@@ -108,12 +108,22 @@ CORRELATION = Table(
     | {"level": TEXT, "protocol": TEXT},
     optional=frozenset({"r", "ci_low", "ci_high"}),
 )
+CURVES = Table(
+    {**_CELL, "iteration": INTEGER, "env_steps": INTEGER, "episode_return": NUMBER, "low": NUMBER, "high": NUMBER}
+    | {"seeds": INTEGER},
+    optional=frozenset({"episode_return", "low", "high"}),
+)
 CLAIMS = Table(
-    dict.fromkeys(("id", "claim", "published"), TEXT)
-    | dict.fromkeys(("measured", "ci_low", "ci_high"), NUMBER)
-    | dict.fromkeys(("test", "verdict"), TEXT),
+    {"id": TEXT, "claim": TEXT, "published": NUMBER, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER}
+    | {"test": TEXT, "verdict": TEXT},
     optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
 )
+CLAIM_PARTS = Table(
+    {"id": TEXT, "part": TEXT, "published": NUMBER, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER}
+    | {"seeds": INTEGER, "rule": TEXT, "verdict": TEXT},
+    optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
+)
+CONTROLLERS = Table({"protocol": TEXT, "controller": TEXT, "mode": TEXT, "episodes": INTEGER}, measures=True)
 
 
 @contextmanager
@@ -281,21 +291,20 @@ def write_monitors(folder: Path | str, episodes: pd.DataFrame) -> None:
 
 
 @contextmanager
-def exclusive(path: Path | str) -> Iterator[bool]:
-    """Hold the lock file `path`, waiting for another process that has it; it is free again when its holder dies.
-
-    Gives whether there was a wait.
-    """
+def exclusive(path: Path | str) -> Iterator[None]:
+    """Hold the lock file `path`, waiting for another process that has it; it is free again when its holder dies."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w") as lock:
-        waited = False
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            waited = True
+    while True:
+        with path.open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-        yield waited
+            if not path.exists() or not os.path.samestat(path.stat(), os.fstat(lock.fileno())):
+                continue  # its holder has removed it while we waited
+            try:
+                yield
+            finally:
+                path.unlink()
+            return
 
 
 def _to_arrow(frame: pd.DataFrame, table: Table, path: Path) -> pa.Table:

@@ -287,30 +287,31 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
     source: the path of a YAML file, or the mapping that such a file holds.
     Raises ConfigError, a single line, for the first thing that is wrong.
     """
-    if isinstance(source, Mapping):
-        return _validated(source, "config")
+    content, name = (source, "config") if isinstance(source, Mapping) else (require_mapping(source), source)
     try:
-        content = yaml.safe_load(Path(source).read_text(encoding="utf-8"))
+        return Study.model_validate(dict(content))
+    except ValidationError as error:
+        raise ConfigError(f"{name}: {_one_line(error)}") from None
+
+
+def require_mapping(path: Path | str) -> Mapping[str, Any]:
+    """Read a YAML file that must hold a mapping with at least one key. Raises ConfigError."""
+    try:
+        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{source}: cannot be read as YAML: {' '.join(str(error).split())}") from None
-    return _validated(content, str(source))
+        raise ConfigError(f"{path}: cannot be read as YAML: {_flat(error)}") from None
+    if not content:
+        raise ConfigError(f"{path}: is empty; allowed: a mapping with the keys {', '.join(Study.model_fields)}")
+    if not isinstance(content, Mapping):
+        raise ConfigError(
+            f"{path}: {_short(content)} is not a mapping; allowed: the keys {', '.join(Study.model_fields)}"
+        )
+    return content
 
 
 def plain(number: float) -> str:
     """A number in the shortest plain notation, without exponent or trailing zeros: 1.0 -> `1`, 0.5 -> `0.5`."""
     return format(Decimal(repr(number)).normalize(), "f")
-
-
-def _validated(content: Any, source: str) -> Study:
-    keys = ", ".join(Study.model_fields)
-    if content is None or content == {}:
-        raise ConfigError(f"{source}: is empty; allowed: a mapping with the keys {keys}")
-    if not isinstance(content, Mapping):
-        raise ConfigError(f"{source}: = {_short(content)} is not a mapping; allowed: a mapping with the keys {keys}")
-    try:
-        return Study.model_validate(dict(content))
-    except ValidationError as error:
-        raise ConfigError(f"{source}: {_one_line(error)}") from None
 
 
 def _one_line(error: ValidationError) -> str:
@@ -332,8 +333,12 @@ def _allowed(message: str) -> str:
 
 
 def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
+    text = _flat(repr(value))
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _flat(text: object) -> str:
+    return " ".join(str(text).split())
 
 
 def _sorted(value: Any) -> Any:

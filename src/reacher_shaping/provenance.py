@@ -12,14 +12,20 @@ import hashlib
 import os
 import platform
 import subprocess
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from reacher_shaping import artifacts
+
 PACKAGE = __package__ or "reacher_shaping"
 VERSIONED = ("torch", "mujoco", "gymnasium", "numpy", "pandas", "pyarrow", "scipy", "matplotlib", "snakemake")
 
+NEUTRAL = ("meter", "provenance")  # modules that tell of a result and never change one
 WHOLE = "*"  # in place of a definition's name: all definitions of its module
 
 Definition = tuple[str, str]  # (module, name)
@@ -45,6 +51,8 @@ def reachable_code(script: Path) -> dict[str, str]:
     waiting = start.references(start.tree)
     while waiting:
         module, name = waiting.pop()
+        if module in NEUTRAL:
+            continue
         source = _source(module)
         names = source.definitions if name == WHOLE else {name, ""} & source.definitions.keys()
         for found in names:
@@ -80,6 +88,51 @@ def versions() -> dict[str, str]:
 def machine() -> dict[str, Any]:
     """CPU model, number of cores this process may use, and system."""
     return {"cpu": _cpu(), "cores": len(os.sched_getaffinity(0)), "system": f"{platform.system()} {platform.release()}"}
+
+
+@dataclass
+class Record:
+    """What a job was: started when the object is made, told by `to_dict` at its end."""
+
+    wall: float = field(default_factory=time.perf_counter)
+    cpu: float = field(default_factory=time.process_time)
+
+    def to_dict(
+        self, folder: Path, inputs: Iterable[Path], outputs: Iterable[Path], env_steps: int, threads: int
+    ) -> dict[str, Any]:
+        """The job's part of a manifest; `env_steps` are those this process took.
+
+        Files are named relative to `folder`, or by their name alone outside it.
+        """
+        wall = time.perf_counter() - self.wall
+        return {
+            "inputs": _checksums(folder, inputs),
+            "outputs": _checksums(folder, outputs),
+            "versions": versions(),
+            "git": git_state(Path(__file__).parent),
+            **machine(),
+            "threads": threads,
+            "wall_seconds": round(wall, 3),
+            "cpu_seconds": round(time.process_time() - self.cpu, 3),
+            "env_steps": env_steps,
+            "env_steps_per_second": round(env_steps / wall, 1),
+        }
+
+
+def merged_manifest(training: Mapping[str, Any], evaluation: Mapping[str, Any]) -> dict[str, Any]:
+    """`manifest.json` of a block: the training's record, with the evaluation's beside it and all outputs together."""
+    return {
+        **training,
+        "outputs": {**training["outputs"], **evaluation["outputs"]},
+        "evaluation": evaluation,
+    }
+
+
+def _checksums(folder: Path, paths: Iterable[Path]) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder) if path.is_relative_to(folder) else path.name): artifacts.sha256(path)
+        for path in paths
+    }
 
 
 class _Source:

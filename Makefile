@@ -1,0 +1,55 @@
+# One verb each; every target sets itself up. Users of Snakemake can do without: activate .venv and call snakemake.
+SHELL := /bin/bash
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+QUICK := --directory build/quick --configfile workflow/quick.yaml
+FROM_TABLES := plot_figures format_tables run_notebook build_report
+
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+export OMP_NUM_THREADS := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup reproduce quick report test check clean
+
+help: ## what each target does
+	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(READY) ## the virtual environment .venv with pinned packages
+
+$(READY): pyproject.toml requirements.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --requirement requirements.txt
+	$(BIN)/python -m pip install --quiet --no-deps --editable .
+	@touch $@
+
+reproduce: $(READY) ## the study of config.yaml; called again, it goes on
+	@workflow/unlock.sh .
+	snakemake
+	@echo "The report: $(CURDIR)/report/report.html"
+
+quick: $(READY) ## the same at toy scale, into build/quick/
+	@mkdir -p build/quick
+	@workflow/unlock.sh build/quick
+	snakemake $(QUICK)
+	@echo "The report: $(CURDIR)/build/quick/report/report.html"
+
+report: $(READY) ## figures, tables, notebooks and report again from existing results, no training
+	@workflow/unlock.sh .
+	snakemake --allowed-rules $(FROM_TABLES) --forcerun run_notebook build_report -- report/report.html
+	@echo "The report: $(CURDIR)/report/report.html"
+
+test: $(READY) ## the tests
+	python -m pytest
+
+check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
+	ruff check .
+	ruff format --check .
+	snakefmt --check Snakefile workflow
+	mypy
+	workflow/lint.sh
+
+clean: ## removes results, figures, report and build; keeps .venv
+	rm -rf build report/report.html .snakemake
+	find results figures -mindepth 1 ! -name README.md -delete

@@ -1,0 +1,50 @@
+from pathlib import Path
+
+from snakemake.utils import min_version
+
+from reacher_shaping.config import ConfigError, load_study, require_mapping
+
+min_version("9.0")
+
+HERE = Path(workflow.basedir)
+
+
+def or_stop(read, source):
+    try:
+        return read(source)
+    except ConfigError as error:
+        raise WorkflowError(str(error)) from None
+
+
+or_stop(require_mapping, HERE / "config.yaml")
+
+
+configfile: str(HERE / "config.yaml")
+
+
+STUDY = or_stop(load_study, config)
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/train.smk"
+include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/analyse.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/notebooks.smk"
+include: "workflow/rules/media.smk"
+include: "workflow/rules/report.smk"
+
+
+# Intermediate files are named here too: a changed job that failed has lost its outputs, and without them in the
+# targets a later call would find the old tables and have nothing to do (snakemake issue 1978).
+rule all:
+    default_target: True
+    input:
+        BLOCK_FILES,
+        TABLES,
+        FIGURES,
+        FORMATTED_TABLES,
+        NOTEBOOKS,
+        MEDIA,
+        "results/check.txt",
+        "report/report.html",

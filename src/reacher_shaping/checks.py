@@ -1,0 +1,45 @@
+"""What the results of any study must satisfy: complete, finite unless diverged, within what Reacher-v5 allows."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+
+CELL = ["protocol", "variant", "budget", "alpha0"]
+RATES = ["success_rate", "final_success_rate", "deterministic_success_rate", "deterministic_final_success_rate"]
+DISTANCES = ["final_distance", "min_distance"]
+REACH = 0.5  # m; more than the arm's 0.21 plus the farthest target's 0.28
+
+
+def problems(
+    runs: pd.DataFrame, cells: pd.DataFrame, expected: Sequence[Mapping[str, Any]], *, seeds: int, episodes: int
+) -> list[str]:
+    """What is wrong with the tables of runs and cells, one line each; empty if nothing is.
+
+    expected: key columns of each cell of the study; seeds: runs of each; episodes: evaluation episodes of each run.
+    """
+    found = []
+    wanted = pd.MultiIndex.from_tuples(
+        [(*(cell[name] for name in CELL), seed) for cell in expected for seed in range(seeds)]
+    )
+    given = pd.MultiIndex.from_frame(runs[[*CELL, "seed"]])
+    found += [f"run {key} is missing" for key in wanted.difference(given)]
+    found += [f"run {key} is not in the study" for key in given.difference(wanted)]
+    if len(cells) != len(expected):
+        found.append(f"{len(cells)} cells instead of {len(expected)}")
+    sound = runs[~runs["diverged"]]
+    found += _offending(runs, runs["episodes"] != episodes, f"has not {episodes} episodes")
+    for name in RATES:
+        found += _offending(sound, ~sound[name].between(0, 1), f"has {name} outside [0, 1]")
+    for name in DISTANCES:
+        found += _offending(sound, ~sound[name].between(0, REACH), f"has {name} outside [0, {REACH}] m")
+    found += _offending(sound, ~(sound["mean_return"] < 0), "has a mean return that is not negative")
+    found += _offending(
+        sound, sound["success_rate"] < sound["final_success_rate"], "succeeds more often at the end than ever"
+    )
+    return found
+
+
+def _offending(runs: pd.DataFrame, where: "pd.Series[bool]", what: str) -> list[str]:
+    keys = runs.loc[where, [*CELL, "seed"]].itertuples(index=False, name=None)
+    return [f"run {key} {what}" for key in keys]

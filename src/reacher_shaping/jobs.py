@@ -1,0 +1,93 @@
+"""What a training job does around the training: lock its block, go on from a checkpoint, keep one, show progress.
+
+A checkpoint lies outside the job's outputs, because Snakemake deletes the outputs of a failed job, and in a folder
+named by a hash of all that determines the training, so that a changed setting or code never goes on from it.
+"""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import torch
+
+from reacher_shaping import artifacts
+from reacher_shaping.config import Cell
+from reacher_shaping.meter import Meter
+from reacher_shaping.ppo import Adam
+from reacher_shaping.train import TrainState, train
+
+SECONDS_PER_CHECKPOINT = 30.0
+
+
+@contextmanager
+def trained_block(
+    cell: Cell,
+    seeds: Sequence[int],
+    *,
+    radius: float,
+    folder: Path,
+    report: Callable[[str], None],
+    seconds_per_checkpoint: float = SECONDS_PER_CHECKPOINT,
+) -> Iterator[tuple[TrainState, int]]:
+    """Train a block to its end, from the checkpoint in `folder` if there is one, and give its final state.
+
+    Beside it stands the number of iterations that were done here, the rest having been done before the checkpoint.
+
+    Meanwhile no other process trains with the same folder; the checkpoint is removed once the caller has saved the
+    result, that is when the context ends without an exception. `report` gets a line of text now and then.
+    """
+    checkpoint = folder / "checkpoint.pt"
+    with artifacts.exclusive(folder.with_suffix(".lock")):
+        state = load_checkpoint(checkpoint) if checkpoint.exists() else None
+        start = state.iteration if state else 0
+        if start:
+            report(f"goes on from iteration {start} of {cell.iterations}")
+        meter = Meter(cell.iterations, len(seeds) * cell.protocol.ppo.rollout_steps, start)
+        saved = time.monotonic()
+        for current in train(cell, seeds, radius=radius, state=state):
+            state = current
+            for line in meter.lines(state.iteration):
+                report(line)
+            if time.monotonic() - saved > seconds_per_checkpoint:
+                save_checkpoint(checkpoint, state)
+                saved = time.monotonic()
+        assert state is not None, "a cell has at least one iteration"
+        yield state, state.iteration - start
+        checkpoint.unlink(missing_ok=True)
+        if folder.exists():
+            folder.rmdir()
+
+
+def save_checkpoint(path: Path, state: TrainState) -> None:
+    """Write all that training needs to go on, as plain tensors."""
+    content = {
+        "seeds": list(state.seeds),
+        "iteration": state.iteration,
+        "rows": state.rows,
+        "adam": {"first": state.adam.first, "second": state.adam.second, "steps": state.adam.steps},
+        "progress": [{name: torch.from_numpy(value) for name, value in row.items()} for row in state.progress],
+        "episode_returns": [torch.from_numpy(returns) for returns in state.episode_returns],
+    }
+    buffer = io.BytesIO()
+    torch.save(content, buffer)
+    artifacts.write_bytes(path, buffer.getvalue())
+
+
+def load_checkpoint(path: Path) -> TrainState:
+    """Read a checkpoint. Raises ArtifactError."""
+    content = artifacts.load_tensors(path)
+    try:
+        return TrainState(
+            seeds=tuple(content["seeds"]),
+            rows=content["rows"],
+            adam=Adam(**content["adam"]),
+            iteration=content["iteration"],
+            progress=[{name: value.numpy() for name, value in row.items()} for row in content["progress"]],
+            episode_returns=[returns.numpy() for returns in content["episode_returns"]],
+        )
+    except (KeyError, TypeError, AttributeError) as error:
+        raise artifacts.ArtifactError(path, f"is no checkpoint ({error!r})") from None

@@ -1,0 +1,23 @@
+# From the study's tables to executed notebooks; the sources are Python files with cell marks.
+NOTEBOOK_SOURCES = {path.stem: source(path) for path in sorted((HERE / "workflow/notebooks").glob("*.py"))}
+NOTEBOOKS = expand("results/notebooks/{notebook}.ipynb", notebook=NOTEBOOK_SOURCES)
+
+
+rule run_notebook:
+    input:
+        PUBLISHED.values(),
+        TABLES,
+        source=lambda wildcards: NOTEBOOK_SOURCES[wildcards.notebook],
+    output:
+        "results/notebooks/{notebook}.ipynb",
+    params:
+        published=source("report/published"),
+        code=code("run_notebook"),
+        notebook_code=lambda wildcards: code_hash(NOTEBOOK_SOURCES[wildcards.notebook]),
+    log:
+        "results/logs/notebooks/{notebook}.ipynb",
+    benchmark:
+        "results/benchmarks/notebooks/{notebook}.tsv"
+    threads: 1
+    script:
+        "../scripts/run_notebook.py"

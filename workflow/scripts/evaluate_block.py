@@ -1,0 +1,45 @@
+"""Evaluate the policies of one seed block, stochastic and deterministic, on the same resets."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import torch
+from job import logged
+
+from reacher_shaping import artifacts
+from reacher_shaping.config import Environment, Evaluation
+from reacher_shaping.evaluate import evaluate
+from reacher_shaping.policy import Policy
+from reacher_shaping.provenance import Record, merged_manifest
+
+record = Record()
+params, block = snakemake.params, Path(snakemake.output.episodes).parent
+evaluation = Evaluation.model_validate_json(params.evaluation)
+environment = Environment.model_validate_json(params.environment)
+
+with logged(snakemake.log[0]):
+    torch.set_num_threads(snakemake.threads)
+    trained = artifacts.read_policy(snakemake.input.policy)
+    policy = Policy.from_weights(trained.weights)
+    frames = [
+        evaluate(
+            policy.act,
+            trained.seeds,
+            mode=mode,
+            episodes=evaluation.episodes,
+            radius=evaluation.radius,
+            control_weight=environment.control_weight,
+            clip_actions=environment.clip_actions,
+            root_seed=params.root_seed,
+        )
+        for mode in ("stochastic", "deterministic")
+    ]
+    episodes = pd.concat(frames, ignore_index=True)
+    artifacts.write_table(snakemake.output.episodes, episodes, artifacts.EPISODES)
+    files = [Path(snakemake.output.episodes)]
+    part = record.to_dict(block, [Path(snakemake.input.policy)], files, 50 * len(episodes), snakemake.threads)
+    part = {"settings": json.loads(params.evaluation), "code": params.code, **part}
+    artifacts.write_json(
+        snakemake.output.manifest, merged_manifest(artifacts.read_json(snakemake.input.training), part)
+    )

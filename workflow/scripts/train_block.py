@@ -1,0 +1,31 @@
+"""Train one seed block of one cell."""
+
+import hashlib
+import json
+from pathlib import Path
+
+from job import logged
+
+from reacher_shaping import artifacts, jobs
+from reacher_shaping.config import Cell
+from reacher_shaping.provenance import Record
+
+record = Record()
+params, output = snakemake.params, snakemake.output
+cell = Cell.model_validate_json(params.cell)
+block = Path(output.policy).parent
+key = hashlib.sha256(json.dumps([params.cell, params.seeds, params.radius, params.code]).encode()).hexdigest()[:16]
+settings = {"cell": cell.settings(), "radius": params.radius}
+
+with logged(snakemake.log[0]) as say:
+    checkpoints = Path("results/.checkpoints") / key
+    with jobs.trained_block(cell, params.seeds, radius=params.radius, folder=checkpoints, report=say) as (state, done):
+        weights = state.policy(cell).weights()
+        artifacts.write_policy(output.policy, params.seeds, weights, settings)
+        artifacts.write_table(output.progress, state.progress_frame(), artifacts.PROGRESS)
+        artifacts.write_monitors(output.monitor, state.episodes_frame())
+        files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
+        steps = done * cell.protocol.ppo.rollout_steps * len(params.seeds)
+        training = record.to_dict(block, [], files, steps, snakemake.threads)
+        who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
+        artifacts.write_json(output.training, {**who, **training})
