@@ -3,8 +3,8 @@
 A curve is the mean unshaped episode return of each iteration, [S, T] ([S]eed, iteration as [T]ime). One
 iteration averages about 41 episodes and is noisy, so its maximum alone would be biased upwards and land
 anywhere on a plateau. Peak, end and threshold are therefore read from one moving average over `WINDOW`
-iterations (410 episodes); the end of the window is the iteration reported, as in the paper's Fig. 1. What
-hangs on the window is shown by `roughness_by_window`, not assumed.
+iterations (820 episodes), that of the paper's Fig. 1; as there, a window is reported at its last iteration.
+What hangs on the window is shown by `roughness_by_window`, not assumed.
 
 | measure | definition | why |
 |---|---|---|
@@ -27,7 +27,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-WINDOW = 10
+WINDOW = 20
 BURN_IN = 0.2
 WINDOWS = (1, 5, 10, 20, 40)
 
