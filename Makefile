@@ -25,18 +25,18 @@ $(READY): pyproject.toml requirements.txt
 	@touch $@
 
 reproduce: $(READY) ## the study of config.yaml; called again, it goes on
-	@workflow/unlock.sh .
+	@python workflow/unlock.py .
 	snakemake
 	@echo "The report: $(CURDIR)/report/report.html"
 
 quick: $(READY) ## the same at toy scale, into build/quick/
 	@mkdir -p build/quick
-	@workflow/unlock.sh build/quick
+	@python workflow/unlock.py build/quick
 	snakemake $(QUICK)
 	@echo "The report: $(CURDIR)/build/quick/report/report.html"
 
 report: $(READY) ## figures, tables, notebooks and report again from existing results, no training
-	@workflow/unlock.sh .
+	@python workflow/unlock.py .
 	snakemake --allowed-rules $(FROM_TABLES) --forcerun run_notebook build_report -- report/report.html
 	@echo "The report: $(CURDIR)/report/report.html"
 
@@ -44,11 +44,11 @@ test: $(READY) ## the tests
 	python -m pytest
 
 check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
-	ruff check .
-	ruff format --check .
+	ruff check
+	ruff format --check
 	snakefmt --check Snakefile workflow
 	mypy
-	workflow/lint.sh
+	python workflow/lint.py
 
 clean: ## removes results, figures, report and build; keeps .venv
 	rm -rf build report/report.html .snakemake

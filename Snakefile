@@ -2,18 +2,14 @@ from pathlib import Path
 
 from snakemake.utils import min_version
 
-from reacher_shaping.config import ConfigError, load_study, require_mapping
+from reacher_shaping.config import load_study, require_mapping
 
 min_version("9.0")
 
 HERE = Path(workflow.basedir)
 
 
-def or_stop(read, source):
-    try:
-        return read(source)
-    except ConfigError as error:
-        raise WorkflowError(str(error)) from None
+include: "workflow/rules/common.smk"
 
 
 or_stop(require_mapping, HERE / "config.yaml")
@@ -25,7 +21,6 @@ configfile: str(HERE / "config.yaml")
 STUDY = or_stop(load_study, config)
 
 
-include: "workflow/rules/common.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/analyse.smk"

@@ -110,7 +110,7 @@ class Record:
             "outputs": _checksums(folder, outputs),
             "versions": versions(),
             "git": git_state(Path(__file__).parent),
-            **machine(),
+            "machine": machine(),
             "threads": threads,
             "wall_seconds": round(wall, 3),
             "cpu_seconds": round(time.process_time() - self.cpu, 3),

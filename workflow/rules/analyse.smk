@@ -9,7 +9,10 @@ TABLES = [
     "results/claim_parts.csv",
     "results/controllers.parquet",
 ]
-PUBLISHED = {"table2": source("report/published/table2.csv"), "table3": source("report/published/table3.csv")}
+PUBLISHED = {
+    "table2": source("report/published/table2.csv"),
+    "table3": source("report/published/table3.csv"),
+}
 
 
 rule aggregate_runs:
@@ -20,15 +23,15 @@ rule aggregate_runs:
         runs="results/runs.parquet",
         cells="results/cells.parquet",
         curves="results/curves.parquet",
-    params:
-        cells=CELL_OF_BLOCK,
-        root_seed=STUDY.root_seed,
-        code=code("aggregate_runs"),
     log:
         "results/logs/aggregate_runs.log",
     benchmark:
         "results/benchmarks/aggregate_runs.tsv"
     threads: 1
+    params:
+        cells=[cell.key for cell in STUDY.cells for _ in SEEDS],
+        root_seed=STUDY.root_seed,
+        code=code("aggregate_runs"),
     script:
         "../scripts/aggregate_runs.py"
 
@@ -40,14 +43,14 @@ rule correlate:
     output:
         study="results/correlation.csv",
         published="results/correlation_published.csv",
-    params:
-        root_seed=STUDY.root_seed,
-        code=code("correlate"),
     log:
         "results/logs/correlate.log",
     benchmark:
         "results/benchmarks/correlate.tsv"
     threads: 1
+    params:
+        root_seed=STUDY.root_seed,
+        code=code("correlate"),
     script:
         "../scripts/correlate.py"
 
@@ -58,16 +61,16 @@ rule check_results:
         cells="results/cells.parquet",
     output:
         "results/check.txt",
-    params:
-        cells=[cell.key for cell in STUDY.cells],
-        seeds=STUDY.seeds,
-        episodes=STUDY.evaluation.episodes,
-        code=code("check_results"),
     log:
         "results/logs/check_results.log",
     benchmark:
         "results/benchmarks/check_results.tsv"
     threads: 1
+    params:
+        cells=[cell.key for cell in STUDY.cells],
+        seeds=STUDY.seeds,
+        episodes=STUDY.evaluation.episodes,
+        code=code("check_results"),
     script:
         "../scripts/check_results.py"
 
@@ -80,13 +83,13 @@ rule judge_claims:
     output:
         claims="results/claims.csv",
         parts="results/claim_parts.csv",
-    params:
-        root_seed=STUDY.root_seed,
-        code=code("judge_claims"),
     log:
         "results/logs/judge_claims.log",
     benchmark:
         "results/benchmarks/judge_claims.tsv"
     threads: 1
+    params:
+        root_seed=STUDY.root_seed,
+        code=code("judge_claims"),
     script:
         "../scripts/judge_claims.py"

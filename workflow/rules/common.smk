@@ -1,26 +1,20 @@
-# Names that several stages share: the study's cells and blocks, and the files they make.
+# Functions that several stages share.
 import json
 import os
+import sys
 
-from reacher_shaping.config import block_name
+from reacher_shaping.config import ConfigError
 from reacher_shaping.provenance import code_hash
 
-os.environ["OMP_NUM_THREADS"] = "1"  # one thread a job; Snakemake fills the cores with jobs
-
-CELLS = {cell.folder: cell for cell in STUDY.cells}
-SEEDS = {block_name(seeds): seeds for seeds in STUDY.blocks()}
-BLOCKS = [f"results/{cell}/{block}" for cell in CELLS for block in SEEDS]
-CELL_OF_BLOCK = [cell.key for cell in CELLS.values() for _ in SEEDS]
-BLOCK_FILES = expand(
-    "{block}/{file}",
-    block=BLOCKS,
-    file=["policy.pt", "progress.parquet", "monitor", "episodes.parquet", "manifest.json"],
-)
+os.environ.update(OMP_NUM_THREADS="1")  # one thread a job; Snakemake fills the cores with jobs
 
 
-wildcard_constraints:
-    cell=r"[a-z0-9_]+/[a-z0-9_]+/\d+/alpha[\d.]+",
-    block=r"seeds\d+-\d+",
+def or_stop(read, settings):
+    """What `read` makes of the settings; where they are wrong, end with its one line and no traceback."""
+    try:
+        return read(settings)
+    except ConfigError as error:
+        sys.exit(f"ConfigError: {error}")
 
 
 def source(path):

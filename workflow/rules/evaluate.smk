@@ -4,16 +4,13 @@
 rule evaluate_block:
     input:
         policy="results/{cell}/{block}/policy.pt",
-        outputs=multiext("results/{cell}/{block}/", progress="progress.parquet", monitor="monitor"),
+        outputs=multiext(
+            "results/{cell}/{block}/", progress="progress.parquet", monitor="monitor"
+        ),
         training=ancient("results/{cell}/{block}/training.json"),
     output:
         episodes="results/{cell}/{block}/episodes.parquet",
         manifest="results/{cell}/{block}/manifest.json",
-    params:
-        evaluation=as_json(STUDY.evaluation.model_dump()),
-        environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
-        root_seed=STUDY.root_seed,
-        code=code("evaluate_block"),
     log:
         "results/logs/{cell}/{block}/evaluate.log",
     benchmark:
@@ -21,6 +18,13 @@ rule evaluate_block:
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        evaluation=as_json(STUDY.evaluation.model_dump()),
+        environment=lambda wildcards: as_json(
+            CELLS[wildcards.cell].protocol.environment.model_dump()
+        ),
+        root_seed=STUDY.root_seed,
+        code=code("evaluate_block"),
     script:
         "../scripts/evaluate_block.py"
 
@@ -28,15 +32,20 @@ rule evaluate_block:
 rule evaluate_controllers:
     output:
         "results/controllers.parquet",
-    params:
-        evaluation=as_json(STUDY.evaluation.model_dump()),
-        environments=as_json({name: protocol.environment.model_dump() for name, protocol in STUDY.protocols.items()}),
-        root_seed=STUDY.root_seed,
-        code=code("evaluate_controllers"),
     log:
         "results/logs/evaluate_controllers.log",
     benchmark:
         "results/benchmarks/evaluate_controllers.tsv"
     threads: 1
+    params:
+        evaluation=as_json(STUDY.evaluation.model_dump()),
+        environments=as_json(
+            {
+                name: protocol.environment.model_dump()
+                for name, protocol in STUDY.protocols.items()
+            }
+        ),
+        root_seed=STUDY.root_seed,
+        code=code("evaluate_controllers"),
     script:
         "../scripts/evaluate_controllers.py"

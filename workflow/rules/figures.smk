@@ -1,6 +1,10 @@
 # From the study's tables to the paper's figures and formatted tables.
-FIGURES = expand("figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=["svg", "pdf", "png"])
-FORMATTED_TABLES = expand("results/tables/table_{number}.{kind}", number=[1, 2, 3], kind=["csv", "md"])
+FIGURES = expand(
+    "figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=["svg", "pdf", "png"]
+)
+FORMATTED_TABLES = expand(
+    "results/tables/table_{number}.{kind}", number=[1, 2, 3], kind=["csv", "md"]
+)
 
 
 rule plot_figures:
@@ -13,13 +17,13 @@ rule plot_figures:
         controllers="results/controllers.parquet",
     output:
         FIGURES,
-    params:
-        code=code("plot_figures"),
     log:
         "results/logs/plot_figures.log",
     benchmark:
         "results/benchmarks/plot_figures.tsv"
     threads: 1
+    params:
+        code=code("plot_figures"),
     script:
         "../scripts/plot_figures.py"
 
@@ -30,12 +34,12 @@ rule format_tables:
         cells="results/cells.parquet",
     output:
         FORMATTED_TABLES,
-    params:
-        code=code("format_tables"),
     log:
         "results/logs/format_tables.log",
     benchmark:
         "results/benchmarks/format_tables.tsv"
     threads: 1
+    params:
+        code=code("format_tables"),
     script:
         "../scripts/format_tables.py"

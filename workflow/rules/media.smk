@@ -9,14 +9,16 @@ rule render_media:
     output:
         gif="results/media/{name}.gif",
         mp4="results/media/{name}.mp4",
-    params:
-        environment=lambda wildcards: as_json(CELL_NAMES[wildcards.name].protocol.environment.model_dump()),
-        root_seed=STUDY.root_seed,
-        code=code("render_media"),
     log:
         "results/logs/media/{name}.log",
     benchmark:
         "results/benchmarks/media/{name}.tsv"
     threads: 1
+    params:
+        environment=lambda wildcards: as_json(
+            CELL_NAMES[wildcards.name].protocol.environment.model_dump()
+        ),
+        root_seed=STUDY.root_seed,
+        code=code("render_media"),
     script:
         "../scripts/render_media.py"

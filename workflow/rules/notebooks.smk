@@ -1,23 +1,25 @@
 # From the study's tables to executed notebooks; the sources are Python files with cell marks.
-NOTEBOOK_SOURCES = {path.stem: source(path) for path in sorted((HERE / "workflow/notebooks").glob("*.py"))}
+NOTEBOOK_SOURCES = {
+    path.stem: source(path)
+    for path in sorted((HERE / "workflow/notebooks").glob("*.py"))
+}
 NOTEBOOKS = expand("results/notebooks/{notebook}.ipynb", notebook=NOTEBOOK_SOURCES)
 
 
 rule run_notebook:
     input:
-        PUBLISHED.values(),
         TABLES,
+        **PUBLISHED,
         source=lambda wildcards: NOTEBOOK_SOURCES[wildcards.notebook],
     output:
         "results/notebooks/{notebook}.ipynb",
-    params:
-        published=source("report/published"),
-        code=code("run_notebook"),
-        notebook_code=lambda wildcards: code_hash(NOTEBOOK_SOURCES[wildcards.notebook]),
     log:
-        "results/logs/notebooks/{notebook}.ipynb",
+        "results/logs/notebooks/{notebook}.log",
     benchmark:
         "results/benchmarks/notebooks/{notebook}.tsv"
     threads: 1
+    params:
+        code=code("run_notebook"),
+        notebook_code=lambda wildcards: code_hash(NOTEBOOK_SOURCES[wildcards.notebook]),
     script:
         "../scripts/run_notebook.py"

@@ -4,10 +4,16 @@ import hashlib
 
 rule build_report:
     input:
-        TABLES,
         BLOCK_FILES,
-        PUBLISHED.values(),
+        FORMATTED_TABLES,
         "results/check.txt",
+        **PUBLISHED,
+        runs="results/runs.parquet",
+        cells="results/cells.parquet",
+        correlation="results/correlation.csv",
+        claims="results/claims.csv",
+        controllers="results/controllers.parquet",
+        ledger=source("report/claims.yaml"),
         figures=FIGURES,
         media=MEDIA,
         notebooks=NOTEBOOKS,
@@ -15,14 +21,16 @@ rule build_report:
         template=source("report/report.html.j2"),
     output:
         "report/report.html",
-    params:
-        study=STUDY.model_dump_json(),
-        settings_hash=hashlib.sha256(STUDY.model_dump_json().encode()).hexdigest(),
-        code=code("build_report"),
     log:
         "results/logs/build_report.log",
     benchmark:
         "results/benchmarks/build_report.tsv"
     threads: 1
+    params:
+        study=as_json(STUDY.model_dump(mode="json")),
+        settings_hash=hashlib.sha256(
+            as_json(STUDY.model_dump(mode="json")).encode()
+        ).hexdigest(),
+        code=code("build_report"),
     script:
         "../scripts/build_report.py"

@@ -1,4 +1,19 @@
 # From a cell's settings to trained policies: one job per seed block.
+from reacher_shaping.config import block_name
+
+CELLS = {cell.folder: cell for cell in STUDY.cells}
+SEEDS = {block_name(seeds): seeds for seeds in STUDY.blocks()}
+BLOCKS = [f"results/{cell}/{block}" for cell in CELLS for block in SEEDS]
+BLOCK_FILES = expand(
+    "{block}/{file}",
+    block=BLOCKS,
+    file=["policy.pt", "progress.parquet", "monitor", "episodes.parquet", "manifest.json"],
+)
+
+
+wildcard_constraints:
+    cell=r"[a-z0-9_]+/[a-z0-9_]+/\d+/alpha[\d.]+",
+    block=r"seeds\d+-\d+",
 
 
 rule train_block:
@@ -7,18 +22,18 @@ rule train_block:
         progress="results/{cell}/{block}/progress.parquet",
         monitor=directory("results/{cell}/{block}/monitor"),
         training="results/{cell}/{block}/training.json",
+    log:
+        "results/logs/{cell}/{block}/train.log",
+    benchmark:
+        "results/benchmarks/{cell}/{block}/train.tsv"
+    retries: 1
+    threads: 1
+    resources:
+        mem_mb=1000,
     params:
         cell=lambda wildcards: as_json(CELLS[wildcards.cell].settings()),
         seeds=lambda wildcards: list(SEEDS[wildcards.block]),
         radius=STUDY.evaluation.radius,
         code=code("train_block"),
-    log:
-        "results/logs/{cell}/{block}/train.log",
-    benchmark:
-        "results/benchmarks/{cell}/{block}/train.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-    retries: 1
     script:
         "../scripts/train_block.py"

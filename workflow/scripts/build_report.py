@@ -1,1 +1,31 @@
-"""Not there yet."""
+"""Build the report, one HTML file, from everything the study made."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import yaml
+from job import logged
+
+from reacher_shaping import artifacts, report, tables
+
+given, params = snakemake.input, snakemake.params
+
+with logged(snakemake.log[0]):
+    inputs = report.Inputs(
+        study=json.loads(params.study),
+        settings_hash=params.settings_hash,
+        cells=artifacts.read_table(given.cells, artifacts.CELLS),
+        runs=artifacts.read_table(given.runs, artifacts.RUNS),
+        correlation=artifacts.read_table(given.correlation, artifacts.CORRELATION),
+        claims=artifacts.read_table(given.claims, artifacts.CLAIMS),
+        controllers=artifacts.read_table(given.controllers, artifacts.CONTROLLERS),
+        published=tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3)),
+        ledger=yaml.safe_load(Path(given.ledger).read_text(encoding="utf-8")),
+        figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},
+        media=[Path(path) for path in given.media],
+        notebooks=[Path(path) for path in given.notebooks],
+        manifests=[artifacts.read_json(path) for path in given.manifests],
+        template=Path(given.template),
+    )
+    artifacts.write_text(snakemake.output[0], report.build(inputs))

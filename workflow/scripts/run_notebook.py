@@ -6,9 +6,8 @@ from job import logged
 
 from reacher_shaping import notebooks
 
-with logged(str(Path(snakemake.log[0]).with_suffix(".log"))):
-    parameters = {
-        "results": str(Path("results").resolve()),
-        "published": str(Path(snakemake.params.published).resolve()),
-    }
-    notebooks.execute(Path(snakemake.input.source), Path(snakemake.output[0]), parameters, Path(snakemake.log[0]))
+source, log = Path(snakemake.input.source), Path(snakemake.log[0])
+
+with logged(str(log)):
+    parameters = {"results": "results", "published": str(Path(snakemake.input.table2).parent)}
+    notebooks.execute(source, Path(snakemake.output[0]), parameters, log.with_suffix(".ipynb"))
