@@ -85,11 +85,15 @@ class Sample:
         """Begin another claim: forget how few seeds the cells asked for so far had (`fewest`)."""
         self.fewest = self._seeds
 
+    def has(self, metric: str, cell: Cell) -> bool:
+        """Whether any run of the cell has the metric."""
+        return (metric, *cell) in self._columns and bool(np.isfinite(self._columns[metric, *cell]).any())
+
     def values(self, metric: str, cell: Cell) -> Array:
         """A metric of one cell's runs [B, S]; NaN for diverged or absent runs. Raises MissingError."""
-        runs = self._columns.get((metric, *cell))
-        if runs is None or not np.isfinite(runs).any():
+        if not self.has(metric, cell):
             raise MissingError(f"{metric} of {cell}")
+        runs = self._columns[metric, *cell]
         self.fewest = min(self.fewest, int(np.isfinite(runs).sum()))
         drawn: Array = np.where(np.isfinite(runs), runs, np.nan)[self._draws]
         return drawn
@@ -251,8 +255,12 @@ def ppo_often_fails(s: Sample) -> Estimates:  # noqa: D103
 
 
 def longer_episodes_deteriorate(s: Sample) -> Estimates:
-    """C14; takes a sample with `final_distance_50` and `final_distance_500`: of runs, not of `runs.parquet`."""
-    at_50, at_500 = (s.means(f"final_distance_{steps}", TABLE_2).mean(axis=1) for steps in (50, 500))
+    """C14; takes a sample with the metrics `final_distance_50` and `final_distance_500`."""
+    lengths = ("final_distance_50", "final_distance_500")
+    cells = [cell for cell in TABLE_2 if all(s.has(length, cell) for length in lengths)]
+    if not cells:
+        raise MissingError("episodes of 50 and 500 steps")
+    at_50, at_500 = (s.means(length, cells).mean(axis=1) for length in lengths)
     return {"ratio": s.estimate(at_500 / at_50)}
 
 
