@@ -49,4 +49,5 @@ def normalise(advantages: Array) -> Array:
     """Return advantages [S, N] shifted and scaled to mean 0 and unbiased deviation 1, per seed."""
     mean = advantages.mean(axis=-1, keepdims=True)
     deviation = advantages.std(axis=-1, ddof=1, keepdims=True)
-    return (advantages - mean) / (deviation + 1e-8)
+    normalised: Array = (advantages - mean) / (deviation + 1e-8)
+    return normalised

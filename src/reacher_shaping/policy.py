@@ -35,11 +35,11 @@ class Layers(NamedTuple):
     log_std: Tensor  # [S, 2, 1], independent of the state
 
 
-def _shapes(hidden: int) -> Layers:
+def _shapes(hidden: int) -> list[tuple[int, int]]:
+    """Return the shape of each field of `Layers`, without its seed axis."""
     outputs = ACTION_SIZE + 1
-    return Layers(
-        (OBSERVATION_SIZE + 1, hidden), (hidden, hidden), (1, hidden), (outputs, hidden), (outputs, 1), (ACTION_SIZE, 1)
-    )  # type: ignore[arg-type]
+    first, second, head = (OBSERVATION_SIZE + 1, hidden), (hidden, hidden), (outputs, hidden)
+    return [first, second, (1, hidden), head, (outputs, 1), (ACTION_SIZE, 1)]
 
 
 def parameter_count(hidden: int) -> int:
@@ -175,5 +175,6 @@ def _check_weights(weights: Mapping[str, Tensor], expected: Mapping[str, Tensor]
             raise ValueError(f"{name} is missing or not a tensor")
         if given.shape != tensor.shape or not given.is_floating_point():
             raise ValueError(
-                f"{name} has shape {list(given.shape)} and type {given.dtype}; allowed: {list(tensor.shape)}, floating point"
+                f"{name} has shape {list(given.shape)} and type {given.dtype}; "
+                f"allowed: {list(tensor.shape)}, floating point"
             )

@@ -126,9 +126,7 @@ class Learner:
             for minibatch in zip(*epoch_samples, strict=True):
                 self.differentiate(Samples(*minibatch))
                 self._clip()
-                self.adam.step(
-                    self.rows, self.gradient, self.settings.learning_rate, self.settings.adam_epsilon
-                )
+                self.adam.step(self.rows, self.gradient, self.settings.learning_rate, self.settings.adam_epsilon)
 
     def differentiate(self, samples: Samples) -> None:
         """Write dL/dparameters of one minibatch [S, B] into `gradient`."""

@@ -139,4 +139,5 @@ class Lanes:
 
 def control_cost(action: NDArray[np.floating]) -> NDArray[np.floating]:
     """Return ||a||^2 of actions [..., 2], in the precision of the action as in Gymnasium's reward."""
-    return np.square(action).sum(axis=-1)
+    cost: NDArray[np.floating] = np.square(action).sum(axis=-1)
+    return cost

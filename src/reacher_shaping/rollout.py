@@ -47,7 +47,7 @@ class Plan:
     @cached_property
     def ends(self) -> NDArray[np.bool_]:
         """[L, T] true at each lane's last step."""
-        return np.arange(EPISODE_STEPS) == self.lengths[:, None] - 1
+        return np.equal(np.arange(EPISODE_STEPS), self.lengths[:, None] - 1)
 
     @cached_property
     def order(self) -> NDArray[np.int64]:

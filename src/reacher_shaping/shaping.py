@@ -16,13 +16,13 @@ def potential(name: str, distance: ArrayLike) -> Array:
 
     Source: paper, section 3.3. Raises ValueError for another name.
     """
-    distance = np.asarray(distance, dtype=np.float64)
+    d: Array = np.asarray(distance, dtype=np.float64)
     if name == "none":
-        return np.zeros_like(distance)
+        return np.zeros_like(d)
     if name == "l2":
-        return -distance
+        return np.negative(d)
     if name == "l2sq":
-        return -np.square(distance)
+        return np.negative(np.square(d))
     raise ValueError(f"potential = {name!r}; allowed: 'none', 'l2', 'l2sq'")
 
 
@@ -39,7 +39,7 @@ def alpha(variant: Variant, alpha0: float, env_steps: ArrayLike) -> Array:
 
 def shaping_reward(
     distance: Array,
-    env_steps: Array,
+    env_steps: NDArray[np.int64],
     ends: NDArray[np.bool_],
     *,
     variant: Variant,
@@ -53,7 +53,8 @@ def shaping_reward(
         distance: [S, L, T+1] m, tip to target in s_0 .. s_T.
         env_steps: [L, T] environment steps of training done before each step: t of alpha(t).
         ends: [L, T] true at a lane's last step, where the episode (or the rollout) is cut.
-        variant, alpha0: potential and schedule.
+        variant: potential and schedule.
+        alpha0: alpha at t = 0.
         discount: gamma.
         settings: `form` "paper" is alpha(t) (gamma Phi' - Phi); "dynamic" is gamma alpha(t+1) Phi' -
             alpha(t) Phi, which leaves the optimal policy unchanged for any alpha(t) (Devlin & Kudenko

@@ -22,9 +22,7 @@ class Purpose(IntEnum):
     CONTROLLER = 6
 
 
-def stream(
-    root_seed: int, purpose: Purpose, seed: int = 0, iteration: int = 0
-) -> np.random.Generator:
+def stream(root_seed: int, purpose: Purpose, seed: int = 0, iteration: int = 0) -> np.random.Generator:
     """Return the generator of one purpose.
 
     Episodes of a rollout draw from it one after the other, in order, so its first k episodes are the

@@ -80,9 +80,7 @@ class TrainState:
         )
 
 
-def train(
-    cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState | None = None
-) -> Iterator[TrainState]:
+def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState | None = None) -> Iterator[TrainState]:
     """Train the block and yield its state after every iteration (the same object, changed in place).
 
     Args:
@@ -161,7 +159,10 @@ def prepare(
         torch.from_numpy(advantage.normalise(advantages)).float(),
         torch.from_numpy(targets).float(),
     )
-    return records, {**_summary(reward, extra, rollout, plan, radius), "explained_variance": _explained(fitted, targets)}
+    return records, {
+        **_summary(reward, extra, rollout, plan, radius),
+        "explained_variance": _explained(fitted, targets),
+    }
 
 
 @torch.inference_mode()
