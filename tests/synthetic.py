@@ -87,6 +87,8 @@ def claims():
     rows = [
         ("C1", "Shaping improves success over none", "Table 2", 0.01, -0.02, 0.04, "inconclusive"),
         ("C3", "Decay beats constant shaping", "Table 2", -0.06, -0.10, -0.02, "not reproduced"),
+        ("C17", "Shaping speeds learning up", "prose only", -15000.0, -60000.0, 30000.0, "inconclusive"),
+        ("C12", "L2 gains from a longer budget, L2² does not", "Table 2", 0.05, 0.02, 0.08, "reproduced"),
         ("C18", "PPO often fails to reach the target", "Sec. 1", 0.28, 0.24, 0.32, "reproduced"),
         ("C19", "SAC and TD3 do better than PPO", "cited, not run", np.nan, np.nan, np.nan, "untestable"),
     ]

@@ -1,5 +1,7 @@
 """The paper's four figures. Tables in, matplotlib figures out; no statistic is computed here."""
 
+import textwrap
+
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
@@ -79,6 +81,7 @@ def _explain_curves(figure: Figure, curves: pd.DataFrame) -> None:
     count = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
     band = "; bands: 95 % t interval of the mean" if several else ""
     text = f"Lines: mean over {count} seed{several}{band}; dashed: highest point of the mean curves"
+    text = textwrap.fill(text, round(13.5 * figure.get_figwidth()))
     figure.supxlabel(text, fontsize=8, color="#555555")
 
 

@@ -1,16 +1,34 @@
-"""The report: one HTML file that needs no network and in which every number comes from a table."""
+"""The report: one HTML file that needs no network and in which every number comes from a table or a setting."""
 
+import base64
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import jinja2
+import numpy as np
 import pandas as pd
+
+from reacher_shaping import answers, captions, tables
+from reacher_shaping.style import of_protocol, setting_label, variant_label
+
+MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
+MEDIA_BUDGET = 11_000_000  # bytes of videos put into the file; the rest are links
+MANIFEST_NUMBERS = ("env_steps", "wall_seconds", "cpu_seconds", "env_steps_per_second")
+VERDICT_MARKS = {"reproduced": "✓", "not reproduced": "✗", "inconclusive": "?", "untestable": "\N{EN DASH}"}
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a report is made of; what is None or empty is left out, and the report says so."""
+    """What a report is made of; what is None or empty is left out, and the report says so.
+
+    `study` holds the resolved settings; `published` comes from `tables.published_cells`; `controllers` has
+    `controller, success_rate, final_success_rate, mean_return, final_distance`; `figures` maps names such as
+    `figure_1` to SVG files, in the order to show; `ledger` has the claims' `id, evidence, shown_in`; relative links
+    start at `folder`.
+    """
 
     study: Mapping[str, Any]
     cells: pd.DataFrame
@@ -23,11 +41,222 @@ class Inputs:
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
     notebooks: Sequence[Path] = ()
+    ledger: Sequence[Mapping[str, Any]] = ()
     settings_hash: str = ""
-    root: Path = Path(".")
+    protocol: str | None = None
+    folder: Path = Path("report")
     template: Path = Path("report/report.html.j2")
 
 
+@dataclass(frozen=True)
+class Grid:
+    """A table to show: its headings, its rows, and the columns that are text."""
+
+    headings: list[str]
+    rows: list[list[str]]
+    texts: frozenset[int] = frozenset({0})
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure or video: name, title, caption, content as a data URI or a relative link, and links to other files."""
+
+    name: str
+    title: str
+    caption: str
+    source: str
+    links: Mapping[str, str]
+    kind: str = "image"
+
+
 def build(inputs: Inputs) -> str:
-    """The whole report as HTML text."""
-    raise NotImplementedError
+    """The whole report as HTML text. Raises jinja2's error where the template names what is not there."""
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    template = environment.from_string(inputs.template.read_text(encoding="utf-8"))
+    return template.render(contents(inputs))
+
+
+def contents(inputs: Inputs) -> dict[str, Any]:
+    """Everything the template may name."""
+    cells = of_protocol(inputs.cells, inputs.protocol)
+    pictures = {name: _figure(name, path, inputs) for name, path in inputs.figures.items()}
+    return {
+        "summary": answers.summary(cells, inputs.claims),
+        "study": inputs.study,
+        "settings": settings_grid(inputs.study),
+        "grid": study_grid(cells),
+        "cell_count": len(cells),
+        "run_count": int(cells["seeds"].sum()) if len(cells) else 0,
+        "diverged": int(cells["diverged"].sum()) if len(cells) else 0,
+        "pictures": pictures,
+        "further": [picture for name, picture in pictures.items() if not name.startswith("figure_")],
+        "tables": _tables(cells, inputs),
+        "controllers": controllers_grid(inputs.controllers),
+        "claims": _claims(inputs),
+        "videos": videos(inputs, cells),
+        "notebooks": {path.stem.replace("_", " "): _link(path, inputs) for path in inputs.notebooks},
+        "computation": computation(inputs),
+        "settings_hash": inputs.settings_hash,
+        "protocol": inputs.protocol or (str(cells["protocol"].iloc[0]) if len(cells) else ""),
+    }
+
+
+def settings_grid(study: Mapping[str, Any]) -> Grid:
+    """Settings of each protocol side by side: a row per setting, a column per protocol."""
+    protocols = study.get("protocols", {})
+    flat = {name: _flatten({k: v for k, v in settings.items() if k != "name"}) for name, settings in protocols.items()}
+    keys = list(dict.fromkeys(key for settings in flat.values() for key in settings))
+    rows = [[key, *(plain(settings.get(key, "")) for settings in flat.values())] for key in keys]
+    return Grid(["Setting", *flat], rows)
+
+
+def _flatten(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in settings.items():
+        name = f"{prefix}{key.replace('_', ' ')}"
+        flat |= _flatten(value, f"{name}: ") if isinstance(value, Mapping) else {name: value}
+    return flat
+
+
+def plain(value: Any) -> str:
+    """A setting as people write it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, list | tuple):
+        return ", ".join(plain(entry) for entry in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def study_grid(cells: pd.DataFrame) -> Grid:
+    """Seeds evaluated per variant (rows), budget and alpha0 (columns)."""
+    if cells.empty:
+        return Grid(["Variant"], [])
+    counts = cells.pivot_table(index="variant", columns=["alpha0", "budget"], values="seeds", sort=False)
+    counts = counts.sort_index(axis="columns", level=[0, 1], ascending=[False, True])
+    settings = [(float(pair[0]), int(pair[1])) for pair in counts.columns.to_list()]
+    rows = [
+        [variant_label(str(name)), *("" if np.isnan(count) else f"{count:.0f}" for count in row)]
+        for name, row in zip(counts.index, counts.to_numpy(dtype=float), strict=True)
+    ]
+    return Grid(["Variant", *(setting_label(budget, alpha0) for alpha0, budget in settings)], rows)
+
+
+def _tables(cells: pd.DataFrame, inputs: Inputs) -> dict[str, dict[str, Any]]:
+    """The paper's three tables with titles and captions."""
+    made = {"table_1": tables.table_1, "table_2": tables.table_2, "table_3": tables.table_3}
+    shown = {}
+    for name, make in made.items():
+        frame = tables.readable(make(cells, inputs.published))
+        grid = Grid(list(frame.columns), frame.to_numpy().tolist(), frozenset({1}))
+        shown[name] = {
+            "title": captions.title(name),
+            "caption": captions.caption(name, cells, inputs.runs),
+            "grid": grid,
+        }
+    return shown
+
+
+def controllers_grid(controllers: pd.DataFrame | None) -> Grid | None:
+    """Policies that need no learning, in the measures of the tables."""
+    if controllers is None or controllers.empty:
+        return None
+    keep = ["success_rate", "final_success_rate", "mean_return", "final_distance"]
+    frame = tables.readable(controllers[[name for name in keep if name in controllers]])
+    names = [str(name).replace("_", " ") for name in controllers["controller"]]
+    headings = [heading.removesuffix(" [95 % interval]") for heading in frame.columns]
+    rows = [[name, *row] for name, row in zip(names, frame.to_numpy().tolist(), strict=True)]
+    return Grid(["Policy", *headings], rows)
+
+
+def _claims(inputs: Inputs) -> list[dict[Any, Any]]:
+    """Every claim with verdict, effect, evidence and the figures behind it."""
+    if inputs.claims is None:
+        return []
+    ledger = {entry["id"]: entry for entry in inputs.ledger}
+    rows: list[dict[Any, Any]] = []
+    for row in inputs.claims.to_dict("records"):
+        entry = ledger.get(row["id"], {})
+        shown_in = [(name, captions.title(name).split(".")[0]) for name in entry.get("shown_in", [])]
+        published = row["published"]
+        text = answers.short_number(published) if isinstance(published, float) else str(published)
+        more = {"effect": answers.effect(row), "mark": VERDICT_MARKS.get(row["verdict"], ""), "published": text}
+        rows.append(row | more | {"evidence": entry.get("evidence", ""), "shown_in": shown_in})
+    return rows
+
+
+def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
+    """One video per cell, MP4 where there is one, embedded while the size budget lasts."""
+    chosen = {path.stem: path for path in sorted(inputs.media, key=lambda path: path.suffix != ".gif")}
+    shown, left = [], MEDIA_BUDGET
+    for row in cells.to_dict("records"):
+        stem = f"{row['protocol']}-{row['variant']}-{row['budget']}-alpha{row['alpha0']:g}"
+        path = chosen.pop(stem, None)
+        if path is None:
+            continue
+        size = path.stat().st_size
+        source = data_uri(path) if size <= left else _link(path, inputs)
+        left -= size if size <= left else 0
+        title = f"{variant_label(str(row['variant']))}, {setting_label(int(row['budget']), row['alpha0'])}"
+        caption = f"success rate of the cell {100 * row['success_rate']:.1f} %"
+        kind = "video" if path.suffix == ".mp4" else "image"
+        shown.append(Picture(stem, title, caption, source, {path.suffix[1:].upper(): _link(path, inputs)}, kind))
+    return shown
+
+
+def _figure(name: str, path: Path, inputs: Inputs) -> Picture:
+    caption = captions.caption(name, inputs.cells, inputs.runs, inputs.protocol)
+    others = [path.with_suffix(suffix) for suffix in (".svg", ".pdf") if path.with_suffix(suffix).exists()]
+    links = {other.suffix[1:].upper(): _link(other, inputs) for other in others}
+    return Picture(name, captions.title(name), caption, data_uri(path), links)
+
+
+def _link(path: Path, inputs: Inputs) -> str:
+    return Path(os.path.relpath(path, inputs.folder)).as_posix()
+
+
+def data_uri(path: Path) -> str:
+    """A file's content as a URI, so that the page needs no other file."""
+    return f"data:{MEDIA_TYPES[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def computation(inputs: Inputs) -> Grid | None:
+    """How the study was computed, from the manifests of its blocks."""
+    if not inputs.manifests:
+        return None
+    several = {
+        "Code": [_commit(manifest.get("git", {})) for manifest in inputs.manifests],
+        "Machine": [_machine(manifest.get("machine", {})) for manifest in inputs.manifests],
+        "Threads per job": [str(manifest.get("threads", "")) for manifest in inputs.manifests],
+    }
+    frame = pd.DataFrame([{name: row.get(name, np.nan) for name in MANIFEST_NUMBERS} for row in inputs.manifests])
+    total = frame.sum()
+    speed = frame["env_steps_per_second"].quantile([0.0, 0.5, 1.0]).tolist()
+    rows = [[name, "; ".join(dict.fromkeys(values))] for name, values in several.items()]
+    rows += [
+        ["Training jobs", f"{len(frame):,}"],
+        ["Environment steps", f"{total['env_steps']:,.0f}"],
+        [
+            "Training time, all jobs",
+            f"{total['wall_seconds'] / 3600:.2f} h wall, {total['cpu_seconds'] / 3600:.2f} h CPU",
+        ],
+        ["Steps per second of a job", f"{speed[1]:,.0f} (median; {speed[0]:,.0f} to {speed[2]:,.0f})"],
+    ]
+    packages: dict[str, dict[str, None]] = {}
+    for manifest in inputs.manifests:
+        for name, version in manifest.get("versions", {}).items():
+            packages.setdefault(name, {})[str(version)] = None
+    rows.append(["Versions", ", ".join(f"{name} {' / '.join(found)}" for name, found in packages.items())])
+    return Grid(["", ""], rows, frozenset({0, 1}))
+
+
+def _commit(git: Mapping[str, Any]) -> str:
+    commit = str(git.get("commit") or "not under version control")[:12]
+    return f"{commit} with uncommitted changes" if git.get("dirty") else commit
+
+
+def _machine(machine: Mapping[str, Any]) -> str:
+    return ", ".join(str(machine[name]) + (" cores" if name == "cores" else "") for name in machine)

@@ -1,0 +1,51 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Correlations (Figure 3)
+#
+# How start weight, success rate, mean return and budget go together over the cells of the main grid.
+
+# %% tags=["parameters"]
+results = "results"
+published = "report/published"
+protocol = "paper"
+
+# %%
+from pathlib import Path
+
+from IPython.display import SVG, Markdown
+
+from reacher_shaping import artifacts, captions, plots, style
+
+folder = Path(results)
+
+# %%
+cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
+ours = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
+published_correlation = artifacts.read_table(folder / "correlation_published.csv", artifacts.CORRELATION)
+
+# %% [markdown]
+# Beside ours: the same code applied to the published Table 2.
+
+# %%
+SVG(style.to_bytes(plots.figure_3(ours, published_correlation, protocol), "svg"))
+
+# %%
+Markdown(captions.caption("figure_3", cells, protocol=protocol))
+
+# %% [markdown]
+# ## All coefficients
+
+# %%
+upper = ours[(ours["protocol"] == protocol) & (ours["x"] < ours["y"])]
+upper.pivot(index=["x", "y"], columns=["method", "level"], values="r").round(3)

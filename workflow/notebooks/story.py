@@ -1,0 +1,118 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Does reward shaping help PPO reach?
+#
+# The study from its question to its answers. Every number below is read from the tables of this study.
+#
+# A two-joint arm learns to bring its fingertip to a random target (Reacher-v5). Potential-based shaping adds
+# `alpha(t) (gamma Phi(s') - Phi(s))` to the reward, where Phi is minus the distance to the target (L2) or minus its
+# square (L2²), and alpha(t) is constant or falls linearly to zero. The paper trained one agent per setting and found
+# that shaping helps, decayed shaping most. Here every setting is trained from several seeds, and the question is which
+# of the findings stand.
+
+# %% tags=["parameters"]
+results = "results"
+published = "report/published"
+protocol = "paper"
+
+# %%
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import SVG, Markdown
+
+from reacher_shaping import answers, artifacts, captions, plots, style, tables
+
+folder = Path(results)
+
+# %%
+cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
+runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
+lines = artifacts.read_table(folder / "curves.parquet", artifacts.CURVES)
+correlation = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
+published_correlation = artifacts.read_table(folder / "correlation_published.csv", artifacts.CORRELATION)
+claims_file = folder / "claims.csv"
+claims = artifacts.read_table(claims_file, artifacts.CLAIMS) if claims_file.exists() else None
+theirs = tables.published_cells(
+    pd.read_csv(Path(published) / "table2.csv"),
+    pd.read_csv(Path(published) / "table3.csv"),
+)
+
+# %% [markdown]
+# ## In short
+
+# %%
+Markdown(answers.to_markdown(answers.summary(cells, claims, protocol)))
+
+# %% [markdown]
+# ## What was run
+
+# %%
+ours = cells[cells["protocol"] == protocol]
+ours.pivot(index="variant", columns=["budget", "alpha0"], values="seeds").astype("Int64").rename_axis(index="seeds of")
+
+# %% [markdown]
+# ## How training goes
+# The environment's own return, without the shaping terms, iteration by iteration.
+
+# %%
+SVG(style.to_bytes(plots.figure_1(lines, protocol), "svg"))
+
+# %%
+Markdown(captions.caption("figure_1", cells, runs, protocol))
+
+# %% [markdown]
+# ## Who reaches the target
+# Evaluation counts an episode as a success if the fingertip comes close enough at any step, even in passing. A policy
+# that merely flails earns some successes too, so the tables also give success at the last step.
+
+# %%
+SVG(style.to_bytes(plots.figure_2(cells, theirs, protocol), "svg"))
+
+# %%
+Markdown(captions.caption("figure_2", cells, runs, protocol))
+
+# %%
+table = tables.table_1(cells, theirs, protocol)
+Markdown(tables.to_markdown(table, captions.caption("table_1", cells, runs, protocol)))
+
+# %% [markdown]
+# ## Does a better return mean more success?
+
+# %%
+SVG(style.to_bytes(plots.figure_3(correlation, published_correlation, protocol), "svg"))
+
+# %% [markdown]
+# ## The experiment of the appendix
+# Decayed shaping with the squared distance.
+
+# %%
+SVG(style.to_bytes(plots.figure_4(lines, protocol), "svg"))
+
+# %%
+table = tables.table_3(cells, theirs, protocol)
+Markdown(tables.to_markdown(table, captions.caption("table_3", cells, runs, protocol)))
+
+# %% [markdown]
+# ## All cells
+
+# %%
+table = tables.table_2(cells, theirs, protocol)
+Markdown(tables.to_markdown(table, captions.caption("table_2", cells, runs, protocol)))
+
+# %% [markdown]
+# ## Which claims stand
+
+# %%
+Markdown("The claims have not been tested in this study." if claims is None else answers.claims_markdown(claims))
