@@ -202,7 +202,7 @@ def read_table(path: Path | str, table: Table) -> pd.DataFrame:
     path = Path(path)
     try:
         if path.suffix == ".csv":
-            frame = pd.read_csv(path, float_precision="round_trip", keep_default_na=False, na_values=[""])
+            frame = pd.read_csv(path, keep_default_na=False, na_values=[""])
             arrow = _to_arrow(frame, table, path)
         else:
             arrow = pq.read_table(path)

@@ -4,9 +4,7 @@
 rule evaluate_block:
     input:
         policy="results/{cell}/{block}/policy.pt",
-        outputs=multiext(
-            "results/{cell}/{block}/", progress="progress.parquet", monitor="monitor"
-        ),
+        outputs=multiext("results/{cell}/{block}/", progress="progress.parquet", monitor="monitor"),
         training=ancient("results/{cell}/{block}/training.json"),
     output:
         episodes="results/{cell}/{block}/episodes.parquet",
@@ -20,9 +18,7 @@ rule evaluate_block:
         mem_mb=1000,
     params:
         evaluation=as_json(STUDY.evaluation.model_dump()),
-        environment=lambda wildcards: as_json(
-            CELLS[wildcards.cell].protocol.environment.model_dump()
-        ),
+        environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
         root_seed=STUDY.root_seed,
         code=code("evaluate_block"),
     script:
@@ -39,12 +35,7 @@ rule evaluate_controllers:
     threads: 1
     params:
         evaluation=as_json(STUDY.evaluation.model_dump()),
-        environments=as_json(
-            {
-                name: protocol.environment.model_dump()
-                for name, protocol in STUDY.protocols.items()
-            }
-        ),
+        protocols=as_json([protocol.model_dump() for protocol in STUDY.protocols.values()]),
         root_seed=STUDY.root_seed,
         code=code("evaluate_controllers"),
     script:

@@ -1,10 +1,6 @@
 # From the study's tables to the paper's figures and formatted tables.
-FIGURES = expand(
-    "figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=["svg", "pdf", "png"]
-)
-FORMATTED_TABLES = expand(
-    "results/tables/table_{number}.{kind}", number=[1, 2, 3], kind=["csv", "md"]
-)
+FIGURES = expand("figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=["svg", "pdf", "png"])
+FORMATTED_TABLES = expand("results/tables/table_{number}.{kind}", number=[1, 2, 3], kind=["csv", "md"])
 
 
 rule plot_figures:

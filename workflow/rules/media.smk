@@ -15,9 +15,8 @@ rule render_media:
         "results/benchmarks/media/{name}.tsv"
     threads: 1
     params:
-        environment=lambda wildcards: as_json(
-            CELL_NAMES[wildcards.name].protocol.environment.model_dump()
-        ),
+        environment=lambda wildcards: as_json(CELL_NAMES[wildcards.name].protocol.environment.model_dump()),
+        radius=STUDY.evaluation.radius,
         root_seed=STUDY.root_seed,
         code=code("render_media"),
     script:

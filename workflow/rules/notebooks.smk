@@ -1,8 +1,5 @@
 # From the study's tables to executed notebooks; the sources are Python files with cell marks.
-NOTEBOOK_SOURCES = {
-    path.stem: source(path)
-    for path in sorted((HERE / "workflow/notebooks").glob("*.py"))
-}
+NOTEBOOK_SOURCES = {path.stem: source(path) for path in sorted((HERE / "workflow/notebooks").glob("*.py"))}
 NOTEBOOKS = expand("results/notebooks/{notebook}.ipynb", notebook=NOTEBOOK_SOURCES)
 
 

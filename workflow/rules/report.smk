@@ -28,9 +28,7 @@ rule build_report:
     threads: 1
     params:
         study=as_json(STUDY.model_dump(mode="json")),
-        settings_hash=hashlib.sha256(
-            as_json(STUDY.model_dump(mode="json")).encode()
-        ).hexdigest(),
+        settings_hash=hashlib.sha256(as_json(STUDY.model_dump(mode="json")).encode()).hexdigest(),
         code=code("build_report"),
     script:
         "../scripts/build_report.py"
