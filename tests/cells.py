@@ -1,0 +1,30 @@
+"""Cells for the tests of the engine, small where size does not matter."""
+
+from reacher_shaping.config import PPO, Cell, Environment, Protocol, Shaping, Variant
+
+VARIANTS = {
+    "none": Variant(name="none", potential="none"),
+    "l2": Variant(name="l2", potential="l2"),
+    "l2sq": Variant(name="l2sq", potential="l2sq"),
+    "decay": Variant(name="decay", potential="l2", schedule="linear", horizon=3000),
+}
+
+
+def cell(variant="none", *, iterations=3, alpha0=1.0, root_seed=7, environment=None, shaping=None, **ppo):
+    """A cell of the `paper` protocol, changed where told."""
+    settings = PPO(**ppo)
+    protocol = Protocol(
+        name="paper", environment=Environment(**(environment or {})), ppo=settings, shaping=Shaping(**(shaping or {}))
+    )
+    return Cell(
+        protocol=protocol,
+        variant=VARIANTS[variant],
+        budget=iterations * settings.rollout_steps,
+        alpha0=alpha0,
+        root_seed=root_seed,
+    )
+
+
+def small(variant="none", **changes):
+    """Rollouts of 192 steps (three episodes and one of 42), two epochs, minibatches of 32."""
+    return cell(variant, **{"rollout_steps": 192, "epochs": 2, "minibatch_size": 32, **changes})
