@@ -1,0 +1,86 @@
+import pytest
+import torch
+
+from reacher_shaping import artifacts, jobs
+from reacher_shaping.config import PPO, Cell, Protocol, Variant
+from reacher_shaping.meter import Meter
+
+CELL = Cell(
+    protocol=Protocol(name="test", ppo=PPO(rollout_steps=256, epochs=2)),
+    variant=Variant(name="l2", potential="l2"),
+    budget=1024,
+)
+SEEDS = [3, 5]
+
+
+def trained(folder, lines, seconds_per_checkpoint=30.0):
+    with jobs.trained_block(
+        CELL,
+        SEEDS,
+        radius=0.02,
+        folder=folder,
+        report=lines.append,
+        seconds_per_checkpoint=seconds_per_checkpoint,
+    ) as (state, done):
+        return state, done
+
+
+def interrupted(folder, monkeypatch, after):
+    """Train until `after` iterations, a checkpoint each, then die as by a signal."""
+    train = jobs.train
+
+    def dying(*arguments, **settings):
+        for state in train(*arguments, **settings):
+            yield state
+            if state.iteration == after:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(jobs, "train", dying)
+    with pytest.raises(KeyboardInterrupt):
+        trained(folder, [], seconds_per_checkpoint=0.0)
+    monkeypatch.undo()
+
+
+@pytest.mark.parametrize("after", [1, 3, 4])
+def test_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch, after):
+    whole, done = trained(tmp_path / "whole", [])
+    assert done == 4
+    interrupted(tmp_path / "cut", monkeypatch, after)
+    lines = []
+    resumed, done = trained(tmp_path / "cut", lines)
+    assert done == 4 - after
+    assert lines[0] == f"goes on from iteration {after} of 4"
+    assert torch.equal(whole.rows, resumed.rows)
+    assert whole.progress_frame().equals(resumed.progress_frame())
+    assert whole.episodes_frame().equals(resumed.episodes_frame())
+
+
+def test_finished_block_leaves_no_checkpoint(tmp_path):
+    trained(tmp_path / "key", [], seconds_per_checkpoint=0.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_checkpoint_stays_until_the_result_is_saved(tmp_path):
+    folder = tmp_path / "key"
+    with (
+        pytest.raises(OSError, match="disk full"),
+        jobs.trained_block(CELL, SEEDS, radius=0.02, folder=folder, report=print, seconds_per_checkpoint=0.0),
+    ):
+        raise OSError("disk full")
+    assert (folder / "checkpoint.pt").exists()
+    assert trained(folder, [])[1] == 0
+
+
+def test_damaged_checkpoint_is_named(tmp_path):
+    (tmp_path / "key").mkdir()
+    (tmp_path / "key/checkpoint.pt").write_bytes(b"PK")
+    with pytest.raises(artifacts.ArtifactError, match=r"checkpoint\.pt"):
+        trained(tmp_path / "key", [])
+
+
+def test_meter_tells_speed_and_time_left():
+    meter = Meter(total=100, steps=1000, start=50)
+    meter.begun -= 10.0
+    meter.said -= 60.0
+    assert list(meter.lines(60)) == ["iteration 60/100, 1,000 steps/s, 0.7 min left"]
+    assert list(meter.lines(61)) == []
