@@ -85,12 +85,12 @@ def correlation(r=(0.1, 0.91, 0.03, 0.37, 0.3, -0.2)):
 def claims():
     """One claim of each verdict, as `claims.csv` has them."""
     rows = [
-        ("C1", "Shaping improves success over none", "Table 2", 0.01, -0.02, 0.04, "inconclusive"),
-        ("C3", "Decay beats constant shaping", "Table 2", -0.06, -0.10, -0.02, "not reproduced"),
-        ("C17", "Shaping speeds learning up", "prose only", -15000.0, -60000.0, 30000.0, "inconclusive"),
-        ("C12", "L2 gains from a longer budget, L2² does not", "Table 2", 0.05, 0.02, 0.08, "reproduced"),
-        ("C18", "PPO often fails to reach the target", "Sec. 1", 0.28, 0.24, 0.32, "reproduced"),
-        ("C19", "SAC and TD3 do better than PPO", "cited, not run", np.nan, np.nan, np.nan, "untestable"),
+        ("C1", "Shaping improves success over none", 0.051, 0.01, -0.02, 0.04, "inconclusive"),
+        ("C3", "Decay beats constant shaping", -0.02, -0.06, -0.10, -0.02, "not reproduced"),
+        ("C17", "Shaping speeds learning up", np.nan, -15000.0, -60000.0, 30000.0, "inconclusive"),
+        ("C12", "L2 gains from a longer budget, L2² does not", 0.03, 0.05, 0.02, 0.08, "reproduced"),
+        ("C18", "PPO often fails to reach the target", np.nan, 0.28, 0.24, 0.32, "reproduced"),
+        ("C19", "SAC and TD3 do better than PPO", np.nan, np.nan, np.nan, np.nan, "untestable"),
     ]
     frame = pd.DataFrame(rows, columns=["id", "claim", "published", "measured", "ci_low", "ci_high", "verdict"])
     frame.insert(6, "test", "paired difference over seeds")

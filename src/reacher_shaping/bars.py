@@ -18,6 +18,7 @@ from reacher_shaping.style import (
     of_protocol,
     setting_label,
     settings_of,
+    stochastic,
     variant_color,
     variant_label,
     variant_order,
@@ -42,13 +43,13 @@ def figure_2(
     parts = [in_groups(ours, ("none", "constant", "decay")), in_groups(ours, ("decay_l2sq",))]
     shades = {setting: index for index, setting in enumerate(settings_of(ours))}
     figure = Figure(figsize=(11.5, 4.3))
-    panels = figure.subplots(1, 2, sharey=True, width_ratios=[max(len(part), 4) for part in parts])
+    panels = figure.subplots(1, 2, sharey=True, width_ratios=[max(len(part), 4) if len(part) else 2 for part in parts])
     for axes, part, title in zip(panels, parts, ("Main grid", "Decay with L2²"), strict=True):
         axes.set_title(title)
         _draw_bars(axes, part, published, shades)
     panels[0].set_ylim(bottom=0)
     if controllers is not None and not controllers.empty:
-        _draw_controllers(list(panels), controllers)
+        _draw_controllers(list(panels), stochastic(controllers, protocol))
     panels[0].yaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
     panels[0].set_ylabel("Success rate: tip within the radius\nat any step of an episode")
     _legend(figure, ours, shades)
@@ -99,7 +100,7 @@ def _draw_controllers(panels: list[Axes], controllers: pd.DataFrame) -> None:
     place = -top
     for row in controllers.sort_values("success_rate").to_dict("records"):
         value = row["success_rate"]
-        text = str(row["controller"])
+        text = str(row["controller"]).replace("_", " ")
         if value <= top:
             for axes in (panel for panel in panels if panel.patches):
                 axes.axhline(value, color="#555555", linewidth=0.9, linestyle=":", label="_controller")

@@ -1,5 +1,7 @@
 """Figures the paper does not have. Tables in, matplotlib figures out; no statistic is computed here."""
 
+from typing import Any
+
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
@@ -11,6 +13,7 @@ from matplotlib.ticker import PercentFormatter
 from reacher_shaping.bars import PUBLISHED
 from reacher_shaping.style import (
     STYLE,
+    budget_label,
     empty_panel,
     of_protocol,
     setting_label,
@@ -50,9 +53,7 @@ def seed_strip(
         return figure
     values = of_protocol(runs, protocol).groupby(CELL)[metric]
     theirs = {} if published is None or metric not in published else published.set_index(CELL)[metric].to_dict()
-    rows = sorted(
-        ours.to_dict("records"), key=lambda row: (variant_order(row["variant"]), -row["alpha0"], row["budget"])
-    )
+    rows = sorted(ours.to_dict("records"), key=_row_order)
     for y, row in enumerate(rows):
         key = (row["variant"], row["budget"], row["alpha0"])
         color = variant_color(row["variant"])
@@ -85,32 +86,56 @@ def _name_rows(axes: Axes, names: list[str]) -> None:
 
 
 @mpl.rc_context(STYLE)
-def forest(comparisons: pd.DataFrame, unit: str = "Difference in success rate") -> Figure:
-    """A row per paired comparison: difference, interval, corrected p; a filled dot where the interval leaves zero out.
+def forest(
+    comparisons: pd.DataFrame, family: str = "none", metric: str = "success_rate", protocol: str | None = None
+) -> Figure:
+    """A row per paired comparison of a family: difference, interval, Holm-corrected p; filled where zero is left out.
 
-    `comparisons`: `label` (text), `difference, low, high`, optionally `p_holm`.
+    `comparisons` as `comparisons.comparison_frame` gives it: `family, metric`, the cell's key, `other_variant,
+    other_budget, other_alpha0, difference, ci_low, ci_high, p_holm`.
     """
-    figure = Figure(figsize=(7.5, 1.2 + 0.27 * max(len(comparisons), 4)))
+    ours = of_protocol(comparisons, protocol)
+    ours = ours[(ours["family"] == family) & (ours["metric"] == metric)].dropna(subset="difference")
+    figure = Figure(figsize=(7.8, 1.2 + 0.27 * max(len(ours), 4)))
     axes = figure.subplots()
-    if comparisons.empty:
+    if ours.empty:
         empty_panel(axes, "not in this study")
         return figure
+    rows = sorted(ours.to_dict("records"), key=_row_order)
     axes.axvline(0, color="#555555", linewidth=1, linestyle="--", label="_zero")
-    for y, row in enumerate(comparisons.to_dict("records")):
-        clear = row["low"] > 0 or row["high"] < 0
-        color = "#0072B2" if clear else "#777777"
-        axes.plot([row["low"], row["high"]], [y, y], color=color, linewidth=1.6, label="_interval")
+    for y, row in enumerate(rows):
+        color = variant_color(row["variant"])
+        clear = row["ci_low"] > 0 or row["ci_high"] < 0
+        axes.plot([row["ci_low"], row["ci_high"]], [y, y], color=color, linewidth=1.6, label="_interval")
         face = color if clear else "white"
         axes.plot(row["difference"], y, "o", color=color, markerfacecolor=face, markersize=5.5, label="_difference")
-        if "p_holm" in row and np.isfinite(row["p_holm"]):
+        if np.isfinite(row["p_holm"]):
             text = f"p = {row['p_holm']:.3f}" if row["p_holm"] >= 0.001 else "p < 0.001"
             axes.annotate(
                 text, (1, y), xycoords=("axes fraction", "data"), xytext=(5, 0), textcoords="offset points",
                 va="center", fontsize=8, color="#444444", annotation_clip=False,
             )  # fmt: skip
-    _name_rows(axes, [str(label) for label in comparisons["label"]])
-    axes.set_xlabel(unit)
+    _name_rows(axes, [_comparison(row) for row in rows])
+    axes.set_xlabel(f"Paired difference in {metric.replace('_', ' ')}")
     return figure
+
+
+def _row_order(row: dict[Any, Any]) -> tuple[Any, ...]:
+    """Rows by variant, full alpha0 first, then by budget."""
+    return variant_order(row["variant"]), -row["alpha0"], row["budget"]
+
+
+def _comparison(row: dict[Any, Any]) -> str:
+    """Both cells of a comparison; of the second only what differs."""
+    ours = f"{variant_label(row['variant'])} · {setting_label(row['budget'], row['alpha0'])}"
+    parts = []
+    if row["other_variant"] != row["variant"]:
+        parts.append(variant_label(row["other_variant"]))
+    elif row["other_alpha0"] != row["alpha0"]:
+        parts.append(f"α₀ = {row['other_alpha0']:g}")
+    if row["other_budget"] != row["budget"]:
+        parts.append(budget_label(row["other_budget"]))
+    return f"{ours}  less  {' · '.join(parts)}"
 
 
 @mpl.rc_context(STYLE)
@@ -172,15 +197,16 @@ def _lines_by_setting(frame: pd.DataFrame, x: str, y: str, x_label: str, y_label
 def lottery(frame: pd.DataFrame) -> Figure:
     """How often each statement comes out when a study has one seed per cell: a bar per statement.
 
-    `frame`: `statement` (text), `probability` (0 to 1).
+    `frame` as `lottery.lottery_frame` gives it: `statement`, `share` (0 to 1).
     """
+    frame = frame.dropna(subset="share")
     figure = Figure(figsize=(7.5, 1.0 + 0.3 * max(len(frame), 3)))
     axes = figure.subplots()
     if frame.empty:
         empty_panel(axes, "not in this study")
         return figure
-    bars = axes.barh(range(len(frame)), frame["probability"], color="#0072B2", height=0.65)
-    labels = [f"{100 * probability:.1f} %" for probability in frame["probability"]]
+    bars = axes.barh(range(len(frame)), frame["share"], color="#0072B2", height=0.65)
+    labels = [f"{100 * share:.1f} %" for share in frame["share"]]
     axes.bar_label(bars, labels, padding=4, fontsize=8)
     _name_rows(axes, [str(statement) for statement in frame["statement"]])
     axes.set_xlim(0, 1.08)

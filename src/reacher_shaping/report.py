@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping import answers, captions, tables
-from reacher_shaping.style import of_protocol, setting_label, variant_label
+from reacher_shaping.style import of_protocol, setting_label, stochastic, variant_label
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
 MEDIA_BUDGET = 11_000_000  # bytes of videos put into the file; the rest are links
@@ -93,7 +93,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         "pictures": pictures,
         "further": [picture for name, picture in pictures.items() if not name.startswith("figure_")],
         "tables": _tables(cells, inputs),
-        "controllers": controllers_grid(inputs.controllers),
+        "controllers": controllers_grid(inputs.controllers, inputs.protocol),
         "claims": _claims(inputs),
         "videos": videos(inputs, cells),
         "notebooks": {path.stem.replace("_", " "): _link(path, inputs) for path in inputs.notebooks},
@@ -160,10 +160,11 @@ def _tables(cells: pd.DataFrame, inputs: Inputs) -> dict[str, dict[str, Any]]:
     return shown
 
 
-def controllers_grid(controllers: pd.DataFrame | None) -> Grid | None:
+def controllers_grid(controllers: pd.DataFrame | None, protocol: str | None = None) -> Grid | None:
     """Policies that need no learning, in the measures of the tables."""
     if controllers is None or controllers.empty:
         return None
+    controllers = stochastic(controllers, protocol)
     keep = ["success_rate", "final_success_rate", "mean_return", "final_distance"]
     frame = tables.readable(controllers[[name for name in keep if name in controllers]])
     names = [str(name).replace("_", " ") for name in controllers["controller"]]

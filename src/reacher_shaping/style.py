@@ -119,10 +119,19 @@ def number(value: float, digits: int) -> str:
 
 
 def of_protocol(frame: pd.DataFrame, protocol: str | None) -> pd.DataFrame:
-    """The rows of one protocol; of the first one met where none is named."""
-    if frame.empty:
+    """The rows of one protocol, of the first one met where none is named; all where the table has no protocol."""
+    if frame.empty or "protocol" not in frame:
         return frame
     return frame[frame["protocol"] == (protocol or frame["protocol"].iloc[0])]
+
+
+def stochastic(controllers: pd.DataFrame, protocol: str | None) -> pd.DataFrame:
+    """The controllers' rows of one protocol in the mode of the paper's evaluation, where the table has several."""
+    ours = of_protocol(controllers, protocol)
+    if "mode" in ours:
+        repeated = ours["controller"].duplicated(keep=False)
+        ours = ours[~repeated | (ours["mode"] == "stochastic")]
+    return ours
 
 
 def in_groups(frame: pd.DataFrame, groups: Sequence[str]) -> pd.DataFrame:
