@@ -1,0 +1,38 @@
+"""A training job in a fresh process, for its start and its memory: prints two numbers.
+
+Seconds since the epoch when the first rollout was collected, and the peak memory in MB at the end, files written.
+"""
+
+import json
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from reacher_shaping import artifacts, jobs
+from reacher_shaping.config import Cell
+from reacher_shaping.provenance import Record
+from reacher_shaping.rollout import Collector
+
+cell = Cell.model_validate_json(sys.argv[1])
+seeds = range(int(sys.argv[2]))
+record = Record()
+collected = []
+collect = Collector.collect
+
+
+def noting_the_time(self, policy, iteration):
+    rollout = collect(self, policy, iteration)
+    collected.append(time.time())
+    return rollout
+
+
+Collector.collect = noting_the_time  # type: ignore[method-assign]
+
+with tempfile.TemporaryDirectory() as folder:
+    block = Path(folder)
+    with jobs.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
+        artifacts.write_policy(block / "policy.pt", list(seeds), state.policy(cell).weights(), {})
+        artifacts.write_table(block / "progress.parquet", state.progress_frame(), artifacts.PROGRESS)
+print(json.dumps([collected[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))

@@ -1,0 +1,82 @@
+"""The rungs from the plain loop to the engine, each adding one idea to the one before."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from functools import partial
+from unittest.mock import patch
+
+import plain_loop
+import torch
+
+from reacher_shaping import ppo, rollout
+from reacher_shaping import train as training
+from reacher_shaping.config import Cell
+from reacher_shaping.policy import forward, layers
+from reacher_shaping.reacher import ACTION_SIZE, Lanes
+
+RADIUS = 0.02
+
+
+class AutogradLearner(ppo.Learner):
+    """The stack of networks as a reader would first write it: autograd, and torch's own Adam on the rows."""
+
+    def __init__(self, rows, settings, adam=None):
+        super().__init__(rows, settings, adam)
+        self.parameter = torch.nn.Parameter(rows)
+        self.optimizer = torch.optim.Adam([self.parameter], lr=settings.learning_rate, eps=settings.adam_epsilon)
+
+    def update(self, records, shuffles):
+        for epoch in range(shuffles.shape[1]):
+            for chosen in shuffles[:, epoch].split(self.settings.minibatch_size, dim=1):
+                self.optimizer.zero_grad()
+                minibatch = records.gather(1, chosen[..., None].expand(-1, -1, records.shape[2]))
+                self.loss(ppo.unpack(minibatch)).backward()
+                norm = self.parameter.grad.norm(dim=1, keepdim=True)
+                self.parameter.grad.mul_((self.settings.max_gradient_norm / (norm + 1e-6)).clamp(max=1))
+                self.optimizer.step()
+
+    def loss(self, samples):
+        """The sum of the seeds' losses: their gradients do not meet."""
+        settings, network = self.settings, layers(self.parameter, self.settings.hidden_units)
+        output = forward(network, samples.features)
+        mean, value = output[:, :ACTION_SIZE], output[:, ACTION_SIZE]
+        deviation = (samples.action - mean) * torch.exp(-network.log_std)
+        ratio = torch.exp(ppo.log_probability(deviation, network.log_std) - samples.log_prob)
+        clipped = ratio.clamp(1 - settings.clip_range, 1 + settings.clip_range)
+        surrogate = torch.min(ratio * samples.advantage, clipped * samples.advantage).mean(1)
+        value_loss = (value - samples.target).square().mean(1)
+        entropy = settings.entropy_coefficient * ppo.entropy(network.log_std)
+        return (settings.value_coefficient * value_loss - surrogate - entropy).sum()
+
+
+def plain(cell: Cell, seeds: Sequence[int]) -> Iterator[object]:
+    """The plain loop; it knows one seed."""
+    return plain_loop.train(cell, seeds[0])
+
+
+def engine(
+    cell: Cell, seeds: Sequence[int], *, autograd: bool = False, contacts: bool = False
+) -> Iterator[training.TrainState]:
+    """The engine, with the ideas taken out that are named."""
+    with ExitStack() as parts:
+        # Both are made in the first iteration; what is made stays as it is.
+        if autograd:
+            parts.enter_context(patch.object(ppo, "Learner", AutogradLearner))
+        if contacts:
+            parts.enter_context(patch.object(rollout, "Lanes", partial(Lanes, contacts=True)))
+        iterator = training.train(cell, seeds, radius=RADIUS)
+        first = next(iterator)
+    yield first
+    yield from iterator
+
+
+def rungs(cell: Cell, seeds: Sequence[int]) -> dict[str, tuple[int, Iterator[object]]]:
+    """Return the rungs in order: name -> (seeds, iterations of training)."""
+    one = seeds[:1]
+    return {
+        "plain loop": (1, plain(cell, one)),
+        "+ lanes": (1, engine(cell, one, autograd=True, contacts=True)),
+        "+ stack of seeds": (len(seeds), engine(cell, seeds, autograd=True, contacts=True)),
+        "+ written-out gradient": (len(seeds), engine(cell, seeds, contacts=True)),
+        "+ contacts off": (len(seeds), engine(cell, seeds)),
+    }

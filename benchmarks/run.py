@@ -1,0 +1,251 @@
+"""Measure the engine against its peers and its floor, side by side on one pinned core.
+
+    python benchmarks/run.py [--quick] [--part PART ...] [--repeats N] [--out FOLDER]
+
+Writes results.csv, results.md and results.svg into FOLDER (default: this folder; with --quick: build/benchmarks).
+"""
+
+# ruff: noqa: E402 (one thread and the path of the plain loop must be set before the imports)
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent / "tests"))  # the plain loop lives there
+
+import peers
+import torch
+from ladder import RADIUS, engine, rungs
+from present import write
+from side_by_side import Measure, Workload, measure, pin, ratios, take_turns
+
+from reacher_shaping.config import Cell, load_study
+from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
+from reacher_shaping.policy import Policy, initialise
+from reacher_shaping.reacher import EPISODE_STEPS
+
+BLOCK = 10
+"""Seeds of the study's default block."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is measured: all, or just enough to see that it runs."""
+
+    repeats: int = 5
+    seeds: tuple[int, ...] = (1, 2, 5, BLOCK, 20, 40)
+    budgets: tuple[int, ...] = (1, 2, 4, 8)  # iterations
+    chunks: int = 10  # of LANES_PER_SEED episodes
+    quick: bool = False
+
+    @property
+    def block(self) -> int:
+        return BLOCK if BLOCK in self.seeds else self.seeds[-1]
+
+    def cell(self, iterations: int = 10_000) -> Cell:
+        """The first cell of the study with as many iterations as are asked for; small rollouts when quick."""
+        cell = load_study(HERE.parent / "config.yaml").cells[0].model_dump()
+        if self.quick:
+            cell["protocol"]["ppo"] |= {"rollout_steps": 128, "epochs": 1}
+        cell["budget"] = iterations * cell["protocol"]["ppo"]["rollout_steps"]
+        return Cell.model_validate(cell)
+
+
+QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, quick=True)
+
+
+def iterations(iterator: Iterator[object], steps: int) -> Workload:
+    """An iteration of training a call, worth `steps` environment steps over all seeds."""
+
+    def one() -> float:
+        next(iterator)
+        return steps
+
+    return one
+
+
+def training(cell: Cell, seeds: int) -> Workload:
+    return iterations(engine(cell, range(seeds)), seeds * cell.protocol.ppo.rollout_steps)
+
+
+def measure_training(size: Size) -> Iterator[Measure]:
+    """Training against Stable-Baselines3's PPO with the same hyperparameters, and against the floor."""
+    cell, block = size.cell(), size.block
+    floors = {seeds: peers.Floor(cell, seeds) for seeds in (block, 1)}
+    rates: dict[str, list[float]] = {}
+    names = {"engine": block, "engine of one": 1}
+    workloads: dict[str, Workload] = {name: training(cell, seeds) for name, seeds in names.items()}
+    workloads["peer"] = peers.stable_baselines(cell, shared=False)
+    workloads["peer, shared trunk"] = peers.stable_baselines(cell, shared=True)
+    for seeds, floor in floors.items():
+        workloads[f"physics {seeds}"] = timed_share(floor, "physics")
+        workloads[f"products {seeds}"] = timed_share(floor, "products")
+    rates = take_turns(workloads, size.repeats)
+    part = "training"
+    for name, seeds in names.items():
+        label = f"{seeds} seeds" if seeds > 1 else "1 seed"
+        must, aim = (13, 18) if seeds > 1 else (5, 8)
+        ratio = ratios(rates[name], rates["peer"])
+        yield measure(part, f"{label} / Stable-Baselines3", ratio, "x", must=must, aim=aim)
+        ratio = ratios(rates[name], rates["peer, shared trunk"])
+        yield measure(part, f"{label} / Stable-Baselines3 with the shared trunk", ratio, "x")
+        shares = zip(rates[name], rates[f"physics {seeds}"], rates[f"products {seeds}"], strict=True)
+        fractions = [rate * (1 / physics + 1 / products) for rate, physics, products in shares]
+        targets = {"must": 0.6, "aim": 0.8} if seeds > 1 else {}
+        yield measure(part, f"{label}, fraction of the floor", fractions, "of 1", **targets)
+        physics = ratios(rates[name], rates[f"physics {seeds}"])
+        yield measure(part, f"{label}, share of mj_step calls in its time", physics, "of 1")
+        yield measure(part, f"{label}", rates[name], "steps/s")
+    for name in ("peer", "peer, shared trunk"):
+        yield measure(part, name.replace("peer", "Stable-Baselines3"), rates[name], "steps/s")
+
+
+def timed_share(floor: peers.Floor, name: str) -> Workload:
+    """Environment steps per second if this share of the floor were all there is.
+
+    A workload's time is measured around it, so what only prepares the share is kept out by its own clock: the steps
+    are scaled to the whole call.
+    """
+
+    def one() -> float:
+        begun = time.process_time()
+        seconds = floor.physics() if name == "physics" else floor.products_seconds()
+        whole = time.process_time() - begun
+        return floor.seeds * floor.plan.steps * whole / seconds
+
+    return one
+
+
+def measure_evaluation(size: Size) -> Iterator[Measure]:
+    """Evaluation against a loop over gymnasium.make_vec with the same policy."""
+    cell, block = size.cell(), size.block
+    weight, hidden = cell.protocol.environment.control_weight, cell.protocol.ppo.hidden_units
+    torch.set_flush_denormal(True)
+    settings = {"radius": RADIUS, "control_weight": weight, "root_seed": 0, "mode": "stochastic"}
+
+    def ours(seeds: int) -> Workload:
+        policy = Policy(initialise(range(seeds), 0, hidden), hidden)
+
+        def episodes() -> float:
+            return EPISODE_STEPS * len(
+                evaluate(policy.act, range(seeds), episodes=size.chunks * LANES_PER_SEED, **settings)
+            )
+
+        return episodes
+
+    policy = Policy(initialise([0], 0, hidden), hidden)
+    workloads = {
+        "block": ours(block),
+        "one": ours(1),
+        "make_vec": peers.make_vec_evaluation(policy, weight, LANES_PER_SEED, size.chunks),
+    }
+    rates = take_turns(workloads, size.repeats)
+    part = "evaluation"
+    yield measure(
+        part, f"{block} policies / gymnasium.make_vec", ratios(rates["block"], rates["make_vec"]), "x", must=3, aim=5
+    )
+    yield measure(part, "1 policy / gymnasium.make_vec", ratios(rates["one"], rates["make_vec"]), "x")
+    for name, label in (("block", f"{block} policies"), ("one", "1 policy"), ("make_vec", "gymnasium.make_vec")):
+        yield measure(part, label, rates[name], "steps/s")
+
+
+def fresh_job(cell: Cell, seeds: int) -> tuple[float, float]:
+    """Train in a new process: wall seconds to its first rollout, which is collected, and peak memory in MB."""
+    begun = time.time()
+    command = [sys.executable, str(HERE / "fresh_job.py"), cell.model_dump_json(), str(seeds)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    collected, memory = json.loads(done.stdout.splitlines()[-1])
+    return collected - begun, memory
+
+
+def measure_jobs(size: Size) -> Iterator[Measure]:
+    """Start and memory of a training job; the start is wall time, files in the disk cache."""
+    cell = size.cell(iterations=2)
+    found = [fresh_job(cell, size.block) for _ in range(size.repeats + 1)][1:]
+    start, memory = ([pair[n] for pair in found] for n in (0, 1))
+    label = f"job of {size.block} seeds"
+    yield measure("jobs", f"{label}, start to first rollout", start, "s", must=6, aim=4, lower_is_better=True)
+    yield measure("jobs", f"{label}, peak memory", memory, "MB", must=800, aim=500, lower_is_better=True)
+
+
+def measure_ladder(size: Size) -> Iterator[Measure]:
+    """What each idea brings, from the plain loop to the engine."""
+    cell = size.cell()
+    steps = cell.protocol.ppo.rollout_steps
+    workloads = {
+        name: iterations(iterator, seeds * steps) for name, (seeds, iterator) in rungs(cell, range(size.block)).items()
+    }
+    rates = take_turns(workloads, size.repeats)
+    for name in rates:
+        yield measure("ladder", name, ratios(rates[name], rates["plain loop"]), "x plain loop")
+    for before, name in pairwise(rates):
+        yield measure("ladder gain", name, ratios(rates[name], rates[before]), "x rung before")
+
+
+def measure_scaling(size: Size) -> Iterator[Measure]:
+    """Cost against seeds per block and against budget."""
+    cell = size.cell()
+    rates = take_turns({str(seeds): training(cell, seeds) for seeds in size.seeds}, size.repeats)
+    for seeds in size.seeds:
+        ratio = ratios(rates[str(seeds)], rates[str(size.block)])
+        yield measure("seeds per block", str(seeds), ratio, f"x steps/s of {size.block}")
+
+    def whole_run(count: int) -> Workload:
+        def run() -> float:
+            for _ in engine(size.cell(iterations=count), range(size.block)):
+                pass
+            return 1.0
+
+        return run
+
+    runs = take_turns({str(count): whole_run(count) for count in size.budgets}, max(1, size.repeats // 2))
+    for count in size.budgets:
+        ratio = ratios(runs[str(size.budgets[0])], runs[str(count)])
+        yield measure("budget", f"{count} iterations", ratio, f"x time of {size.budgets[0]}")
+
+
+PARTS = {
+    "training": measure_training,
+    "evaluation": measure_evaluation,
+    "jobs": measure_jobs,
+    "ladder": measure_ladder,
+    "scaling": measure_scaling,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="tiny workloads: shows that it runs, measures nothing")
+    parser.add_argument("--part", action="append", choices=PARTS, help="only this part; may be given again")
+    parser.add_argument("--repeats", type=int, help="rounds per part, after one to warm up")
+    parser.add_argument("--out", type=Path, help="folder of the results")
+    parser.add_argument("--note", default="", help="a sentence on the circumstances, for the head of the table")
+    options = parser.parse_args()
+    size = QUICK if options.quick else Size()
+    if options.repeats is not None:
+        size = Size(**{**vars(size), "repeats": max(1, options.repeats)})
+    core = pin()
+    torch.set_num_threads(1)
+    load, begun, measures = os.getloadavg()[0], time.time(), []
+    for part in options.part or PARTS:
+        for found in PARTS[part](size):
+            measures.append(found)
+            print(f"{found.part:16s} {found.name:52s} {found.value:10.3f} {found.unit}", flush=True)
+    out = options.out or (HERE.parent / "build" / "benchmarks" if options.quick else HERE)
+    facts = {"core": core, "load": load, "minutes": (time.time() - begun) / 60, "note": options.note}
+    write(out, measures, facts)
+    print(f"written to {out}")
+
+
+if __name__ == "__main__":
+    main()
