@@ -23,6 +23,6 @@ with logged(snakemake.log[0]):
         clip_actions=environment.clip_actions,
         root_seed=params.root_seed,
     )
-    pictures = media.frames(episode, snakemake.wildcards.name)
+    pictures = media.frames(episode, f"{snakemake.wildcards.name}, seed {trained.seeds[0]}")
     media.write_video(snakemake.output.gif, pictures)
     media.write_video(snakemake.output.mp4, pictures)

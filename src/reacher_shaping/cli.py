@@ -1,0 +1,227 @@
+"""What a person runs without Snakemake: play or record a policy, evaluate policy files."""
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from reacher_shaping import __version__
+
+PROGRAM = "reacher-shaping"
+COLUMNS = ("run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance")
+RECORDINGS = (".gif", ".mp4")
+MOST_EPISODES = 10**6
+
+_DESCRIPTION = "Play, record and evaluate trained policies on Reacher-v5."
+_EPILOG = (
+    "A policy is a policy.pt of this project (several runs, one a seed) or one state dict in the layout of the "
+    "released code (ppo_model.pt). Files are read without executing anything in them."
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status: 0, or 1 with one line on stderr; argparse exits with 2."""
+    options = parser().parse_args(arguments)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from reacher_shaping.artifacts import ArtifactError  # after the arguments: --help needs no numerics
+    from reacher_shaping.window import NoDisplayError
+
+    try:
+        options.run_command(options)
+    except (ArtifactError, NoDisplayError, OSError, ValueError) as error:
+        _say(f"error: {error}")
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(PROGRAM, description=_DESCRIPTION, epilog=_EPILOG)
+    top.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    commands = top.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    play = commands.add_parser("play", help="show a policy in a window, or record it", epilog=_EPILOG)
+    play.add_argument("policy", metavar="POLICY", type=Path)
+    play.add_argument("--record", metavar="FILE.gif|.mp4", type=_recording, help="record one episode, no window")
+    play.add_argument("--run", metavar="N", type=_seed, help="which run of the file, by its seed (default: the first)")
+    play.add_argument(
+        "--episodes", metavar="N", type=_count, default=5, help="episodes in the window (default: 5); a record has one"
+    )
+    play.set_defaults(run_command=_play)
+
+    evaluate = commands.add_parser("evaluate", help="evaluate every run of policy files", epilog=_EPILOG)
+    evaluate.add_argument("paths", metavar="PATH", type=Path, nargs="+")
+    evaluate.add_argument("--episodes", metavar="N", type=_count, default=1000, help="episodes a run (default: 1000)")
+    evaluate.add_argument("--out", metavar="FILE.csv", type=Path, help="write the table there (default: to stdout)")
+    evaluate.set_defaults(run_command=_evaluate)
+
+    for command in (play, evaluate):
+        command.add_argument(
+            "--seed",
+            metavar="N",
+            type=_seed,
+            help="draws the targets and the action noise (default: the study's, so a policy.pt repeats its own "
+            "evaluation; 0 for a released state dict)",
+        )
+        command.add_argument(
+            "--mode",
+            choices=("stochastic", "deterministic"),
+            default="stochastic",
+            help="sample actions, as the paper does, or take their mean (default: stochastic)",
+        )
+        command.add_argument(
+            "--control-weight",
+            metavar="W",
+            type=_weight,
+            help="weight of the control cost in the return (default: that of the run's training for a policy.pt, "
+            "1 for a released state dict)",
+        )
+        command.add_argument(
+            "--radius",
+            metavar="R",
+            type=_radius,
+            default=0.02,
+            help="distance to the target in m that counts as success (default: 0.02)",
+        )
+    return top
+
+
+def _play(options: argparse.Namespace) -> None:
+    from reacher_shaping import media, window
+    from reacher_shaping.policy import Policy
+    from reacher_shaping.policy_files import load_policies
+
+    if options.record is None:
+        window.require_display()
+    trained = load_policies(options.policy)
+    seed = trained.seeds[0] if options.run is None else options.run
+    if seed not in trained.seeds:
+        raise ValueError(f"{options.policy}: has no run {seed}; allowed: {', '.join(map(str, trained.seeds))}")
+    row = trained.seeds.index(seed)
+    act = Policy(trained.policy.rows[row : row + 1], trained.policy.hidden).act
+    weight = _control_weight(options, trained.environment.control_weight)
+    root_seed = trained.root_seed if options.seed is None else options.seed
+    clip = trained.environment.clip_actions
+    if options.record is None:
+        mean = window.play(
+            act,
+            episodes=options.episodes,
+            mode=options.mode,
+            control_weight=weight,
+            root_seed=root_seed,
+            clip_actions=clip,
+        )
+        _say(f"run {seed}: mean return {mean:.2f} at control weight {weight:g}")
+        return
+    episode = media.evaluation_episode(
+        act,
+        seed,
+        mode=options.mode,
+        radius=options.radius,
+        control_weight=weight,
+        root_seed=root_seed,
+        clip_actions=clip,
+    )
+    name = trained.name or options.policy.parent.name or options.policy.stem
+    media.write_video(options.record, media.frames(episode, f"{name}, run {seed}, episode seed {root_seed}"))
+    _say(f"{options.record}: run {seed}, return {episode.episode_return:.2f} at control weight {weight:g}")
+
+
+def _evaluate(options: argparse.Namespace) -> None:
+    import numpy as np
+    import pandas as pd
+    import torch
+
+    from reacher_shaping.artifacts import write_text
+    from reacher_shaping.evaluate import evaluate
+    from reacher_shaping.policy_files import load_policies
+
+    torch.set_num_threads(1)
+    files = [(path, load_policies(path)) for path in options.paths]  # all of them first: a wrong one costs no wait
+    tables = []
+    for path, trained in files:
+        weight = _control_weight(options, trained.environment.control_weight)
+        root_seed = trained.root_seed if options.seed is None else options.seed
+        source = trained.source if options.control_weight is None else "as asked for"
+        _say(
+            f"{path}: {len(trained.seeds)} run(s), {options.episodes} {options.mode} episodes each, "
+            f"control weight {weight:g} ({source}), seed {root_seed}"
+        )
+        with np.errstate(over="ignore", invalid="ignore"):  # absurd weights give an infinite return, which says it
+            episodes = evaluate(
+                trained.policy.act,
+                trained.seeds,
+                mode=options.mode,
+                episodes=options.episodes,
+                radius=options.radius,
+                control_weight=weight,
+                root_seed=root_seed,
+                clip_actions=trained.environment.clip_actions,
+            )
+        columns = {"episode_return": "mean_return", "success": "success_rate", "final_success": "final_success_rate"}
+        means = (
+            episodes.rename(columns=columns)
+            .groupby("seed", sort=False)[list(COLUMNS[2:])]
+            .mean(skipna=False)
+            .reset_index()
+        )
+        tables.append(means.assign(run=str(path))[list(COLUMNS)])
+    text = pd.concat(tables, ignore_index=True).to_csv(index=False, lineterminator="\n")
+    if options.out is None:
+        sys.stdout.write(text)
+    else:
+        write_text(options.out, text)
+
+
+def _control_weight(options: argparse.Namespace, default: float) -> float:
+    return default if options.control_weight is None else float(options.control_weight)
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"{PROGRAM}: {' '.join(line.split())}\n")
+
+
+def _number(low: float, allowed: str, *, strict: bool) -> Callable[[str], float]:
+    """Return a reader of finite numbers above `low`, or from `low` on."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or value < low or (strict and value == low):
+            raise argparse.ArgumentTypeError(f"{text!r} is impossible; allowed: {allowed}")
+        return value
+
+    return read
+
+
+def _whole(low: int, high: int, allowed: str) -> Callable[[str], int]:
+    """Return a reader of whole numbers from `low` to `high`."""
+
+    def read(text: str) -> int:
+        if not text.isascii() or not text.isdigit() or len(text) > 30 or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is impossible; allowed: {allowed}")
+        return int(text)
+
+    return read
+
+
+def _recording(text: str) -> Path:
+    if Path(text).suffix.lower() not in RECORDINGS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no kind of video; allowed: a name ending in .gif or .mp4")
+    return Path(text)
+
+
+_radius = _number(0, "a number of m above 0", strict=True)
+_weight = _number(0, "a number from 0 on", strict=False)
+_count = _whole(1, MOST_EPISODES, f"a whole number from 1 to {MOST_EPISODES}")
+_seed = _whole(0, 2**63 - 1, "a whole number from 0 on")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
