@@ -19,25 +19,26 @@ help: ## what each target does
 setup: $(READY) ## the virtual environment .venv with pinned packages
 
 $(READY): pyproject.toml requirements.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; name one: make PYTHON=python3.12")'
+	$(BIN)/python -m pip --version > /dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --requirement requirements.txt
 	$(BIN)/python -m pip install --quiet --no-deps --editable .
 	@touch $@
 
 reproduce: $(READY) ## the study of config.yaml; called again, it goes on
 	@python workflow/unlock.py .
-	snakemake
+	snakemake --quiet rules
 	@echo "The report: $(CURDIR)/report/report.html"
 
 quick: $(READY) ## the same at toy scale, into build/quick/
 	@mkdir -p build/quick
 	@python workflow/unlock.py build/quick
-	snakemake $(QUICK)
+	snakemake $(QUICK) --quiet rules
 	@echo "The report: $(CURDIR)/build/quick/report/report.html"
 
 report: $(READY) ## figures, tables, notebooks and report again from existing results, no training
 	@python workflow/unlock.py .
-	snakemake --allowed-rules $(FROM_TABLES) --forcerun run_notebook build_report -- report/report.html
+	snakemake --allowed-rules $(FROM_TABLES) --forcerun run_notebook build_report --quiet rules -- report/report.html
 	@echo "The report: $(CURDIR)/report/report.html"
 
 test: $(READY) ## the tests

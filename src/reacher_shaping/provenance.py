@@ -64,6 +64,12 @@ def reachable_code(script: Path) -> dict[str, str]:
     return code
 
 
+def reached_files(script: Path | str) -> list[Path]:
+    """The script and the package's modules it reaches, less those that never change a result."""
+    modules = sorted({where.split(".")[0] for where in reachable_code(Path(script))} - {"script"})
+    return [Path(script), *map(_path, modules)]
+
+
 def git_state(folder: Path | str) -> dict[str, Any]:
     """Commit of the repository at `folder` and whether files differ from it; None where there is no repository."""
 

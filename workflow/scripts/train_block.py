@@ -8,7 +8,7 @@ from job import logged
 
 from reacher_shaping import artifacts, jobs
 from reacher_shaping.config import Cell
-from reacher_shaping.provenance import Record
+from reacher_shaping.provenance import Record, reached_files
 
 record = Record()
 params, output = snakemake.params, snakemake.output
@@ -26,6 +26,6 @@ with logged(snakemake.log[0]) as say:
         artifacts.write_monitors(output.monitor, state.episodes_frame())
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
         steps = done * cell.protocol.ppo.rollout_steps * len(params.seeds)
-        training = record.to_dict(block, [], files, steps, snakemake.threads)
+        training = record.to_dict(block, reached_files(__file__), files, steps, snakemake.threads)
         who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
         artifacts.write_json(output.training, {**who, **training})

@@ -1,0 +1,252 @@
+"""The real Snakefile on a copy of the project: one study of toy size is run, then edits are judged by dry runs."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+from reacher_shaping import artifacts
+
+ROOT = Path(__file__).parents[1]
+TINY = {
+    "seeds": 2,
+    "seeds_per_block": 1,
+    "evaluation": {"episodes": 20, "radius": 0.02},
+    "grid": [
+        {"variants": ["none"], "budgets": [2048]},
+        {"variants": ["decay200k_l2sq"], "budgets": [2048], "alpha0": [0.5]},
+    ],
+}
+NONE, DECAY = "results/paper/none/2048/alpha1", "results/paper/decay200k_l2sq/2048/alpha0.5"
+EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "check_results", "plot_figures"}
+
+
+class Project:
+    """A copy of the project in `folder`, with the toy study in its config.yaml."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        for name in ("Snakefile", "profiles", "workflow", "src", "report", "config.yaml"):
+            place, ignored = ROOT / name, shutil.ignore_patterns("__pycache__", "*.egg-info", "report.html")
+            copy = shutil.copytree if place.is_dir() else shutil.copy
+            copy(place, folder / name, **({"ignore": ignored} if place.is_dir() else {}))
+        config = yaml.safe_load((folder / "config.yaml").read_text()) | TINY
+        (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+
+    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess:
+        environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}
+        command = [sys.executable, "-m", "snakemake", *arguments]
+        return subprocess.run(
+            command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False, timeout=3600
+        )
+
+    def run(self, *arguments: str) -> None:
+        done = self.snakemake(*arguments)
+        assert done.returncode == 0, done.stderr[-6000:]
+
+    def planned(self, *arguments: str) -> dict[str, list[str]]:
+        """Rules that a dry run would execute, each with the outputs of its jobs."""
+        done = self.snakemake("--dry-run", *arguments)
+        assert done.returncode == 0, done.stderr[-6000:]
+        jobs: dict[str, list[str]] = {}
+        for rule, outputs in re.findall(
+            r"^rule (\w+):\n(?:    input: .*\n)?    output: (.*)$", done.stdout, re.MULTILINE
+        ):
+            jobs.setdefault(rule, []).extend(outputs.split(", "))
+        return jobs
+
+    @contextmanager
+    def edited(self, name: str, old: str, new: str) -> Iterator[None]:
+        path = self.folder / name
+        text = path.read_text()
+        assert old in text, f"{name} has no {old!r}"
+        with self.replaced(name, text.replace(old, new, 1)):
+            yield
+
+    @contextmanager
+    def configured(self, **changes) -> Iterator[None]:
+        config = yaml.safe_load((self.folder / "config.yaml").read_text()) | changes
+        with self.replaced("config.yaml", yaml.safe_dump(config, sort_keys=False)):
+            yield
+
+    @contextmanager
+    def replaced(self, name: str, text: str) -> Iterator[None]:
+        path = self.folder / name
+        before = path.read_text()
+        path.write_text(text)
+        try:
+            yield
+        finally:
+            path.write_text(before)
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory) -> Project:
+    """The project before anything was run."""
+    return Project(tmp_path_factory.mktemp("empty"))
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory) -> Project:
+    """The project with its toy study run to the end."""
+    project = Project(tmp_path_factory.mktemp("study"))
+    project.run()
+    return project
+
+
+def refusal(project: Project) -> str:
+    """What a dry run says of a wrong configuration, less the name of the profile."""
+    done = project.snakemake("--dry-run")
+    assert done.returncode != 0
+    return "\n".join(line for line in done.stderr.splitlines() if "profile" not in line)
+
+
+def test_impossible_value_ends_a_dry_run_with_one_line(empty):
+    with empty.configured(seeds=0):
+        assert refusal(empty) == "ConfigError: config: seeds = 0: should be greater than or equal to 1"
+
+
+def test_unknown_variant_ends_a_dry_run_with_one_line(empty):
+    with empty.configured(grid=[{"variants": ["l3"], "budgets": [2048]}]):
+        said = refusal(empty)
+    assert said.startswith("ConfigError: config: grid.0.variants = 'l3' is unknown; allowed: none, l2, l2sq")
+    assert "\n" not in said
+
+
+def test_empty_configuration_ends_a_dry_run_with_one_line(empty):
+    with empty.replaced("config.yaml", ""):
+        said = refusal(empty)
+    assert "config.yaml: is empty; allowed: a mapping with the keys root_seed, seeds" in said
+    assert "\n" not in said
+
+
+def test_whole_study_makes_every_file_of_the_contract(project):
+    blocks = [f"{cell}/seeds{seed}-{seed}" for cell in (NONE, DECAY) for seed in (0, 1)]
+    files = ["policy.pt", "progress.parquet", "episodes.parquet", "manifest.json"]
+    expected = [f"{block}/{file}" for block in blocks for file in files]
+    expected += [f"{block}/monitor/{block[-1]}.monitor.csv" for block in blocks]
+    expected += [f"results/{name}.parquet" for name in ("runs", "cells", "controllers")]
+    expected += [f"results/{name}.csv" for name in ("correlation", "claims")]
+    expected += [f"results/tables/table_{number}.{kind}" for number in (1, 2, 3) for kind in ("csv", "md")]
+    expected += [f"figures/figure_{number}.{kind}" for number in (1, 2, 3, 4) for kind in ("svg", "pdf")]
+    expected += [f"results/media/paper-none-2048-alpha1.{kind}" for kind in ("gif", "mp4")]
+    expected += ["results/notebooks/story.ipynb", "report/report.html"]
+    missing = [name for name in expected if not (project.folder / name).exists()]
+    assert missing == []
+
+
+def test_tables_have_the_columns_of_the_contract(project):
+    block = project.folder / f"{DECAY}/seeds1-1"
+    progress = pd.read_parquet(block / "progress.parquet")
+    assert list(progress) == [
+        *["seed", "iteration", "env_steps", "episode_return", "shaped_return", "episode_length", "success_rate"],
+        *["final_distance", "action_std", "entropy", "approx_kl", "clip_fraction", "policy_loss", "value_loss"],
+        "explained_variance",
+    ]
+    assert progress[["seed", "iteration", "env_steps"]].to_numpy().tolist() == [[1, 1, 2048]]
+    episodes = pd.read_parquet(block / "episodes.parquet")
+    assert list(episodes) == [
+        *["seed", "mode", "episode", "episode_return", "reward_distance", "reward_control", "min_distance"],
+        *["final_distance", "first_hit_step", "success", "final_success"],
+    ]
+    assert episodes.groupby("mode").size().to_dict() == {"deterministic": 20, "stochastic": 20}
+    runs = pd.read_parquet(project.folder / "results/runs.parquet")
+    assert len(runs) == 4
+    assert {"protocol", "variant", "budget", "alpha0", "seed", "success_rate", "mean_return"} <= set(runs)
+    claims = pd.read_csv(project.folder / "results/claims.csv")
+    assert list(claims) == ["id", "claim", "published", "measured", "ci_low", "ci_high", "test", "verdict"]
+
+
+def test_manifest_holds_the_checksums_of_the_block(project):
+    block = project.folder / f"{NONE}/seeds0-0"
+    manifest = artifacts.read_json(block / "manifest.json")
+    made = {"policy.pt", "progress.parquet", "episodes.parquet", "monitor/0.monitor.csv"}
+    assert set(manifest["outputs"]) == made
+    for name, checksum in manifest["outputs"].items():
+        assert artifacts.sha256(block / name) == checksum
+    for key in ("settings", "versions", "git", "machine", "threads", "wall_seconds", "cpu_seconds"):
+        assert manifest[key] is not None
+    assert manifest["env_steps"] == 2048
+    assert manifest["env_steps_per_second"] > 0
+
+
+def test_finished_study_has_nothing_to_do(project):
+    assert project.planned() == {}
+
+
+def test_touching_every_source_reruns_nothing(project):
+    for folder in ("src", "workflow", "report", "."):
+        for path in (project.folder / folder).rglob("*") if folder != "." else [project.folder / "config.yaml"]:
+            if path.suffix in {".py", ".smk", ".yaml", ".csv", ".j2"}:
+                path.touch()
+    (project.folder / "Snakefile").touch()
+    assert project.planned() == {}
+
+
+def test_comment_docstring_and_layout_rerun_nothing(project):
+    with (
+        project.edited("src/reacher_shaping/ppo.py", "\n\n\n", "\n\n\n# A comment.\n\n\n"),
+        project.edited("src/reacher_shaping/train.py", '"""Training', '"""The training'),
+        project.edited("workflow/scripts/train_block.py", '"""Train', '"""Now train'),
+        project.edited("config.yaml", "seeds:", "# A comment.\nseeds:"),
+    ):
+        assert project.planned() == {}
+
+
+def test_edit_of_the_update_retrains_every_block(project):
+    with project.edited("src/reacher_shaping/ppo.py", "BETAS = (0.9, 0.999)", "BETAS = (0.9, 0.99)"):
+        jobs = project.planned()
+    assert len([name for name in jobs["train_block"] if name.endswith("policy.pt")]) == 4
+
+
+def test_edit_of_a_plot_redraws_and_does_not_train(project):
+    with project.edited("src/reacher_shaping/plots.py", "def figure_1", "def _new():\n    pass\n\n\ndef figure_1"):
+        assert project.planned() == {}
+    with project.edited("src/reacher_shaping/plots.py", "def figure_1(curves", "def figure_1(curves, /"):
+        jobs = project.planned()
+    assert {"plot_figures", "build_report"} <= set(jobs) <= {"plot_figures", "run_notebook", "build_report"}
+
+
+def test_setting_of_one_cell_reruns_that_cell_and_what_depends_on_it(project):
+    grid = [TINY["grid"][0] | {"ppo": {"learning_rate": 0.001}}, TINY["grid"][1]]
+    with project.configured(grid=grid):
+        jobs = project.planned()
+    for rule in ("train_block", "evaluate_block", "render_media"):
+        assert jobs[rule]
+        assert all("none" in name for name in jobs[rule])
+    assert len([name for name in jobs["train_block"] if name.endswith("policy.pt")]) == 2
+    assert EVALUATION | {"build_report", "run_notebook", "format_tables"} <= set(jobs)
+    assert "evaluate_controllers" not in jobs
+
+
+def test_evaluation_setting_evaluates_again_without_training(project):
+    with project.configured(evaluation={"episodes": 21, "radius": 0.02}):
+        jobs = project.planned()
+    assert "train_block" not in jobs
+    assert len([name for name in jobs["evaluate_block"] if name.endswith("episodes.parquet")]) == 4
+
+
+def test_more_seeds_train_only_the_new_blocks(project):
+    with project.configured(seeds=3):
+        jobs = project.planned()
+    trained = sorted(name for name in jobs["train_block"] if name.endswith("policy.pt"))
+    assert trained == [f"{DECAY}/seeds2-2/policy.pt", f"{NONE}/seeds2-2/policy.pt"]
+    assert all("seeds2-2" in name for name in jobs["evaluate_block"])
+    assert "render_media" not in jobs
+
+
+def test_block_made_again_has_the_same_bytes_and_reruns_nothing_else(project):
+    block = project.folder / f"{NONE}/seeds1-1"
+    names = ["policy.pt", "progress.parquet", "monitor"]
+    before = {name: artifacts.sha256(block / name) for name in names}
+    project.run("--force", "--", f"{NONE}/seeds1-1/policy.pt")
+    assert {name: artifacts.sha256(block / name) for name in names} == before
+    assert project.planned() == {}
