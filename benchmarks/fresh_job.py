@@ -1,6 +1,7 @@
-"""A training job in a fresh process, for its start and its memory: prints two numbers.
+"""A training job in a fresh process, for its start and its memory: prints three numbers.
 
-Seconds since the epoch when the first rollout was collected, and the peak memory in MB at the end, files written.
+Seconds since the epoch and CPU seconds of the process when the first rollout was collected; peak memory in MB at the
+end, when the files are written.
 """
 
 import json
@@ -24,7 +25,7 @@ collect = Collector.collect
 
 def noting_the_time(self, policy, iteration):
     rollout = collect(self, policy, iteration)
-    collected.append(time.time())
+    collected.append((time.time(), time.process_time()))
     return rollout
 
 
@@ -35,4 +36,4 @@ with tempfile.TemporaryDirectory() as folder:
     with jobs.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
         artifacts.write_policy(block / "policy.pt", list(seeds), state.policy(cell).weights(), {})
         artifacts.write_table(block / "progress.parquet", state.progress_frame(), artifacts.PROGRESS)
-print(json.dumps([collected[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+print(json.dumps([*collected[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))

@@ -1,0 +1,68 @@
+"""The benchmark runs, and what it compares with computes the same."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+from cells import small
+from torch.utils.flop_counter import FlopCounterMode
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+
+
+@pytest.fixture(autouse=True)
+def path(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+
+
+def test_every_rung_of_the_ladder_trains_the_same_weights():
+    import ladder
+
+    of = small("l2", iterations=3)
+    trained = {name: [next(iterator) for _ in range(2)][-1] for name, (_, iterator) in ladder.rungs(of, [4, 1]).items()}
+    network, _ = trained.pop("plain loop")
+    expected = network.state_dict()
+    assert list(trained) == ["+ lanes", "+ stack of seeds", "+ written-out gradient", "+ contacts off"]
+    for name, state in trained.items():
+        weights = state.policy(of).weights()
+        for key, tensor in expected.items():
+            # Float32 sums in another order; training moves the weights a thousand times as far.
+            torch.testing.assert_close(weights[key][0], tensor, rtol=0, atol=2e-5, msg=f"{name}: {key}")
+    last, before = trained["+ contacts off"], trained["+ written-out gradient"]
+    assert torch.equal(last.rows, before.rows), "collision detection changes no bit"
+
+
+def test_the_floor_holds_every_matrix_product_of_an_iteration():
+    import ladder
+    import peers
+
+    of = small("l2", iterations=2)
+    iterator = ladder.engine(of, [0, 1, 2])
+    next(iterator)
+    with FlopCounterMode(display=False) as counter:
+        next(iterator)
+    floor = sum(
+        times * 2 * a.shape[0] * a.shape[1] * a.shape[2] * b.shape[2]
+        for times, operands in peers.matrix_products(of.protocol.ppo, 3)
+        for a, b in operands
+    )
+    assert counter.get_total_flops() == floor
+
+
+def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
+    command = [sys.executable, str(BENCHMARKS / "run.py"), "--quick", "--out", str(tmp_path)]
+    subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True)
+    table = pd.read_csv(tmp_path / "results.csv")
+    parts = {"training", "evaluation", "jobs", "ladder", "ladder gain", "seeds per block", "budget"}
+    assert set(table["part"]) == parts
+    assert (table["value"] > 0).all()
+    assert ((table["low"] <= table["value"]) & (table["value"] <= table["high"])).all()
+    assert table[["machine", "threads", "versions", "repeats"]].notna().all(axis=None)
+    assert table["must"].notna().sum() == 6
+    text = (tmp_path / "results.md").read_text()
+    assert all(name in text for name in table["name"])
+    assert "<svg" in (tmp_path / "results.svg").read_text()
