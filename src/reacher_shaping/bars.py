@@ -62,7 +62,7 @@ def _draw_bars(axes: Axes, cells: pd.DataFrame, published: pd.DataFrame, shades:
         empty_panel(axes, "not in this study")
         return
     here = settings_of(cells)
-    width = 0.8 / len(here)
+    width = min(0.8 / len(here), 0.4)
     variants = sorted(cells["variant"].unique(), key=variant_order)
     theirs = published.set_index(["variant", "budget", "alpha0"])["success_rate"].to_dict()
     for cell in cells.to_dict("records"):
@@ -113,7 +113,7 @@ def _draw_controllers(panels: list[Axes], controllers: pd.DataFrame) -> None:
             xycoords=("axes fraction", "data"),
             xytext=(4, 0),
             textcoords="offset points",
-            va="center",
+            va="center" if value <= top else "bottom",
             fontsize=8,
             color="#444444",
             annotation_clip=False,

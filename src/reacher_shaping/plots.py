@@ -129,7 +129,7 @@ def _mark_maximum(axes: Axes, curves: pd.DataFrame) -> None:
         fontsize=8.5,
         color=variant_color(best["variant"]),
     )
-    axes.margins(x=0.01, y=0.12)
+    axes.margins(x=0.01, y=0.15)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping import answers, captions, tables
-from reacher_shaping.style import of_protocol, setting_label, stochastic, variant_label
+from reacher_shaping.style import of_protocol, setting_label, stochastic, variant_label, variant_order
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
 MEDIA_BUDGET = 11_000_000  # bytes of videos put into the file; the rest are links
@@ -138,6 +138,7 @@ def study_grid(cells: pd.DataFrame) -> Grid:
     counts = cells.pivot_table(index="variant", columns=["alpha0", "budget"], values="seeds", sort=False)
     counts = counts.sort_index(axis="columns", level=[0, 1], ascending=[False, True])
     settings = [(float(pair[0]), int(pair[1])) for pair in counts.columns.to_list()]
+    counts = counts.loc[sorted(counts.index, key=variant_order)]
     rows = [
         [variant_label(str(name)), *("" if np.isnan(count) else f"{count:.0f}" for count in row)]
         for name, row in zip(counts.index, counts.to_numpy(dtype=float), strict=True)
@@ -193,7 +194,10 @@ def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
     """One video per cell, MP4 where there is one, embedded while the size budget lasts."""
     chosen = {path.stem: path for path in sorted(inputs.media, key=lambda path: path.suffix != ".gif")}
     shown, left = [], MEDIA_BUDGET
-    for row in cells.to_dict("records"):
+    order = sorted(
+        cells.to_dict("records"), key=lambda row: (variant_order(row["variant"]), -row["alpha0"], row["budget"])
+    )
+    for row in order:
         stem = f"{row['protocol']}-{row['variant']}-{row['budget']}-alpha{row['alpha0']:g}"
         path = chosen.pop(stem, None)
         if path is None:
@@ -202,7 +206,7 @@ def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
         source = data_uri(path) if size <= left else _link(path, inputs)
         left -= size if size <= left else 0
         title = f"{variant_label(str(row['variant']))}, {setting_label(int(row['budget']), row['alpha0'])}"
-        caption = f"success rate of the cell {100 * row['success_rate']:.1f} %"
+        caption = f"success rate of the cell {100 * row['success_rate']:.1f}\N{NO-BREAK SPACE}%"
         kind = "video" if path.suffix == ".mp4" else "image"
         shown.append(Picture(stem, title, caption, source, {path.suffix[1:].upper(): _link(path, inputs)}, kind))
     return shown
