@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 QUICK := --directory build/quick --configfile workflow/quick.yaml
-FROM_TABLES := plot_figures format_tables run_notebook build_report
+FROM_TABLES := plot_figures plot_further format_tables run_notebook build_report
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
