@@ -4,10 +4,16 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
+import cost
 import matplotlib
 import pandas as pd
 from matplotlib.figure import Figure
 from side_by_side import Measure, machine, versions
+
+from reacher_shaping.config import load_study
+
+BLOCK = 10
+"""Seeds of the block whose rates the cost of a study is reckoned with."""
 
 TITLES = {
     "training": "Training, paper protocol",
@@ -17,6 +23,7 @@ TITLES = {
     "ladder gain": "Gain of each idea over the rung before it",
     "seeds per block": "Cost against seeds per block",
     "budget": "Cost against budget",
+    "workflow": "Planning the workflow",
 }
 
 
@@ -52,7 +59,45 @@ def markdown(measures: Sequence[Measure], facts: Mapping[str, object]) -> str:
             cells = [row.name, number(row.value), spread, row.unit, str(row.repeats), *targets, row.verdict]
             lines.append(f"| {' | '.join(cells)} |")
         lines.append("")
+    lines += cost_table(measures)
     return "\n".join(lines)
+
+
+def cost_table(measures: Sequence[Measure]) -> list[str]:
+    """Return what studies take at the rates measured, as Markdown; nothing unless all that it needs was measured."""
+    found = {(row.part, row.name): row.value for row in measures}
+    names = [
+        ("training", f"{BLOCK} seeds"),
+        ("evaluation", f"{BLOCK} policies"),
+        ("jobs", f"job of {BLOCK} seeds, CPU time of the start"),
+    ]
+    if any(name not in found for name in names):
+        return []
+    rates = cost.Rates(*(found[name] for name in names))
+    study = load_study(Path(__file__).parents[1] / "config.yaml")
+    lines = [
+        "## What a study takes at these rates",
+        "",
+        f"Formula in docs/cost.md; the {len(study.cells)} cells of config.yaml, blocks of {BLOCK} seeds (all seeds in",
+        "one block where there are fewer); the rates of one core at the time of measuring; reports left out.",
+        "",
+        "| cells | seeds per cell | environment steps | core hours | cores | hours |",
+        "|---:|---:|---:|---:|---:|---:|",
+    ]
+    for seeds, cores in ((1, 2), (10, 2), (10, 64), (100, 64), (1000, 64), (1000, 2300)):
+        total = cost.study(study, seeds=seeds, seeds_per_block=min(seeds, BLOCK), rates=rates)
+        wall = max(total.core_seconds / cores, total.longest_job) / 3600
+        core_hours = total.core_seconds / 3600
+        cells = [
+            str(len(study.cells)),
+            str(seeds),
+            f"{total.env_steps:,}",
+            f"{core_hours:.3g}",
+            str(cores),
+            f"{wall:.3g}",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return [*lines, ""]
 
 
 def number(value: float) -> str:

@@ -14,6 +14,7 @@ import argparse
 import json
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -46,6 +47,7 @@ class Size:
     seeds: tuple[int, ...] = (1, 2, 5, BLOCK, 20, 40)
     budgets: tuple[int, ...] = (1, 2, 4)  # iterations
     chunks: int = 4  # of LANES_PER_SEED episodes
+    blocks: tuple[int, ...] = (1, 10, 100)  # per cell, for the dry run
     job_iterations: int = 3
     quick: bool = False
 
@@ -62,7 +64,7 @@ class Size:
         return Cell.model_validate(cell)
 
 
-QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, quick=True)
+QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, blocks=(1,), quick=True)
 
 
 def iterations(iterator: Iterator[object], steps: int) -> Workload:
@@ -216,12 +218,41 @@ def measure_scaling(size: Size) -> Iterator[Measure]:
         yield measure("budget", f"{count} iterations", ratio, f"x time of {size.budgets[0]}")
 
 
+def dry_run(seeds: int, folder: Path) -> tuple[int, float, float]:
+    """Let Snakemake plan the study with so many seeds a cell: training jobs, CPU seconds, and peak memory in MB."""
+    overlay = folder / "seeds.yaml"
+    overlay.write_text(f"seeds: {seeds}\nseeds_per_block: {BLOCK}\n")
+    command = [
+        sys.executable, "-m", "snakemake", "--snakefile", str(HERE.parent / "Snakefile"), "--directory", str(folder),
+        "--cores", "1", "--dry-run", "--quiet", "--configfile", str(overlay),
+    ]  # fmt: skip
+    planner = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(planner.pid, 0)
+    if status:
+        raise RuntimeError(f"failed: {' '.join(command)}")
+    jobs = len(load_study(HERE.parent / "config.yaml").cells) * -(-seeds // BLOCK)
+    return jobs, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+
+
+def measure_workflow(size: Size) -> Iterator[Measure]:
+    """What planning costs Snakemake, from one block a cell to a hundred."""
+    for blocks in size.blocks:
+        found = []
+        for _ in range(max(1, size.repeats // 2)):
+            with tempfile.TemporaryDirectory() as folder:
+                found.append(dry_run(blocks * BLOCK, Path(folder)))
+        jobs = f"dry run of {found[0][0]} training jobs"
+        yield measure("workflow", f"{jobs}, CPU time", [numbers[1] for numbers in found], "s")
+        yield measure("workflow", f"{jobs}, peak memory", [numbers[2] for numbers in found], "MB")
+
+
 PARTS = {
     "training": measure_training,
     "evaluation": measure_evaluation,
     "jobs": measure_jobs,
     "ladder": measure_ladder,
     "scaling": measure_scaling,
+    "workflow": measure_workflow,
 }
 
 

@@ -57,7 +57,7 @@ def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
     command = [sys.executable, str(BENCHMARKS / "run.py"), "--quick", "--out", str(tmp_path)]
     subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True)
     table = pd.read_csv(tmp_path / "results.csv")
-    parts = {"training", "evaluation", "jobs", "ladder", "ladder gain", "seeds per block", "budget"}
+    parts = {"training", "evaluation", "jobs", "ladder", "ladder gain", "seeds per block", "budget", "workflow"}
     assert set(table["part"]) == parts
     assert (table["value"] > 0).all()
     assert ((table["low"] <= table["value"]) & (table["value"] <= table["high"])).all()
@@ -66,3 +66,19 @@ def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
     text = (tmp_path / "results.md").read_text()
     assert all(name in text for name in table["name"])
     assert "<svg" in (tmp_path / "results.svg").read_text()
+
+
+def test_cost_of_a_study_is_the_sum_over_its_blocks():
+    import cost
+
+    from reacher_shaping.config import load_study
+
+    study = load_study(Path(__file__).parents[1] / "config.yaml")
+    rates = cost.Rates(training=20_000, evaluation=50_000, start=3)
+    found = cost.study(study, seeds=12, seeds_per_block=10, rates=rates)
+    # 14 cells of 500,000 steps (245 iterations) and 9 of 1,000,000 (489), each a block of ten and a block of two
+    steps = (14 * 245 + 9 * 489) * 2048
+    assert found.env_steps == 12 * steps
+    episodes = 23 * 12 * 2 * 1000 * 50
+    assert found.core_seconds == pytest.approx(12 * steps / 20_000 + episodes / 50_000 + 23 * 2 * 2 * 3)
+    assert found.longest_job == pytest.approx(6 + 10 * (489 * 2048 / 20_000 + 100_000 / 50_000))
