@@ -38,6 +38,7 @@ rule all:
         BLOCK_FILES,
         TABLES,
         FIGURES,
+        FURTHER_FIGURES,
         FORMATTED_TABLES,
         NOTEBOOKS,
         MEDIA,

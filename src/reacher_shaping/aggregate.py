@@ -213,14 +213,24 @@ def radius_frame(blocks: Iterable[Block], radii: Sequence[float] = RADII) -> pd.
     return frame.sort_values(order, ignore_index=True)[[*order, "success_rate", "final_success_rate"]]
 
 
-def radius_cells(radius: pd.DataFrame, root_seed: int) -> pd.DataFrame:
-    """`radius_frame` over seeds: a row per cell, mode and radius with mean, IQM and interval of both rates."""
-    by = [*KEY, "mode", "radius"]
+def over_seeds(frame: pd.DataFrame, by: Sequence[str], metrics: Sequence[str], root_seed: int) -> pd.DataFrame:
+    """A row per group of `by` with the number of `seeds`, and mean, IQM and interval over them of each metric."""
     rows = []
-    for key, group in radius.groupby(by):
+    for key, group in frame.groupby(list(by)):
         row = dict(zip(by, key, strict=True)) | {"seeds": len(group)}
-        for name in ["success_rate", "final_success_rate"]:
+        for name in metrics:
             summary = summarise(group[name], generator(root_seed, *key, name))
             row |= {name + suffix: value for suffix, value in summary.items()}
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def radius_cells(radius: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+    """`radius_frame` over seeds: a row per cell, mode and radius."""
+    return over_seeds(radius, [*KEY, "mode", "radius"], ["success_rate", "final_success_rate"], root_seed)
+
+
+def length_cells(long_episodes: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+    """Evaluations at several episode lengths, over seeds: a row per cell, mode and length (`steps`)."""
+    metrics = ["success_rate", "final_success_rate", "final_distance", "return_per_step", "share_within_radius"]
+    return over_seeds(long_episodes, [*KEY, "mode", "steps"], metrics, root_seed)

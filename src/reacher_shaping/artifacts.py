@@ -123,7 +123,29 @@ CLAIM_PARTS = Table(
     | {"seeds": INTEGER, "rule": TEXT, "verdict": TEXT},
     optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
 )
+COMPARISONS = Table(
+    {"family": TEXT, "metric": TEXT, **_CELL, "other_variant": TEXT, "other_budget": INTEGER, "other_alpha0": NUMBER}
+    | {"seeds": INTEGER},
+    measures=True,
+)
+LOTTERY = Table({"protocol": TEXT, "statement": TEXT, "share": NUMBER}, optional=frozenset({"share"}))
+RADIUS = Table({**_CELL, "mode": TEXT, "radius": NUMBER, "seeds": INTEGER}, measures=True)
 CONTROLLERS = Table({"protocol": TEXT, "controller": TEXT, "mode": TEXT, "episodes": INTEGER}, measures=True)
+_LENGTH = {"seed": INTEGER, "mode": TEXT, "steps": INTEGER, "episodes": INTEGER}
+LONG_EPISODES = Table(_LENGTH, measures=True)
+ALL_LONG_EPISODES = Table({**_CELL, **_LENGTH}, measures=True)
+LENGTHS = Table({**_CELL, "mode": TEXT, "steps": INTEGER, "seeds": INTEGER}, measures=True)
+RADII = Table({**_CELL, "mode": TEXT, "radius": NUMBER, "seeds": INTEGER}, measures=True)
+COMPARISONS = Table(
+    {"family": TEXT, "metric": TEXT, **_CELL, "other_variant": TEXT, "other_budget": INTEGER, "other_alpha0": NUMBER}
+    | {"seeds": INTEGER},
+    measures=True,
+)
+VARIANCE = Table({**_CELL, "seeds": INTEGER}, measures=True)
+POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)
+LOTTERY = Table({"statement": TEXT}, measures=True)
+WINNERS = Table({"variant": TEXT, "budget": INTEGER, "alpha0": NUMBER, "share": NUMBER})
+SPREAD = Table({"quantity": TEXT}, measures=True)
 
 
 @contextmanager

@@ -329,7 +329,8 @@ def _one_line(error: ValidationError) -> str:
 def _allowed(message: str) -> str:
     """Pydantic's message in the words of YAML."""
     message = re.sub(r"^(Input|Value|String|Dictionary|Tuple) (?=should)", "", message)
-    return message.replace("valid tuple", "list").split(" after validation")[0].split(" or instance of")[0]
+    message = message.replace("valid tuple", "list").replace("valid dictionary", "mapping")
+    return message.split(" after validation")[0].split(" or instance of")[0]
 
 
 def _short(value: Any) -> str:

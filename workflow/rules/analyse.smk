@@ -8,7 +8,17 @@ TABLES = [
     "results/claims.csv",
     "results/claim_parts.csv",
     "results/controllers.parquet",
+    "results/radii.parquet",
+    "results/long_episodes.parquet",
+    "results/lengths.parquet",
+    "results/comparisons.parquet",
+    "results/variance.parquet",
+    "results/power.parquet",
+    "results/lottery.csv",
+    "results/winners.csv",
+    "results/spread.csv",
 ]
+BLOCK_CELLS = [cell.key for cell in STUDY.cells for _ in SEEDS]
 PUBLISHED = {
     "table2": source("report/published/table2.csv"),
     "table3": source("report/published/table3.csv"),
@@ -29,7 +39,7 @@ rule aggregate_runs:
         "results/benchmarks/aggregate_runs.tsv"
     threads: 1
     params:
-        cells=[cell.key for cell in STUDY.cells for _ in SEEDS],
+        cells=BLOCK_CELLS,
         root_seed=STUDY.root_seed,
         code=code("aggregate_runs"),
     script:
@@ -53,6 +63,51 @@ rule correlate:
         code=code("correlate"),
     script:
         "../scripts/correlate.py"
+
+
+rule summarise_episodes:
+    input:
+        episodes=expand("{block}/episodes.parquet", block=BLOCKS),
+        long_episodes=expand("{block}/long_episodes.parquet", block=BLOCKS),
+    output:
+        radii="results/radii.parquet",
+        long_episodes="results/long_episodes.parquet",
+        lengths="results/lengths.parquet",
+    log:
+        "results/logs/summarise_episodes.log",
+    benchmark:
+        "results/benchmarks/summarise_episodes.tsv"
+    threads: 1
+    params:
+        cells=BLOCK_CELLS,
+        root_seed=STUDY.root_seed,
+        code=code("summarise_episodes"),
+    script:
+        "../scripts/summarise_episodes.py"
+
+
+rule compare_runs:
+    input:
+        **PUBLISHED,
+        runs="results/runs.parquet",
+    output:
+        comparisons="results/comparisons.parquet",
+        variance="results/variance.parquet",
+        power="results/power.parquet",
+        lottery="results/lottery.csv",
+        winners="results/winners.csv",
+        spread="results/spread.csv",
+    log:
+        "results/logs/compare_runs.log",
+    benchmark:
+        "results/benchmarks/compare_runs.tsv"
+    threads: 1
+    params:
+        protocol=STUDY.cells[0].protocol.name,
+        root_seed=STUDY.root_seed,
+        code=code("compare_runs"),
+    script:
+        "../scripts/compare_runs.py"
 
 
 rule check_results:
@@ -79,6 +134,7 @@ rule judge_claims:
     input:
         **PUBLISHED,
         runs="results/runs.parquet",
+        long_episodes="results/long_episodes.parquet",
         ledger=source("report/claims.yaml"),
     output:
         claims="results/claims.csv",

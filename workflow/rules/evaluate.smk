@@ -25,6 +25,25 @@ rule evaluate_block:
         "../scripts/evaluate_block.py"
 
 
+rule evaluate_long:
+    input:
+        policy="results/{cell}/{block}/policy.pt",
+    output:
+        "results/{cell}/{block}/long_episodes.parquet",
+    log:
+        "results/logs/{cell}/{block}/evaluate_long.log",
+    benchmark:
+        "results/benchmarks/{cell}/{block}/evaluate_long.tsv"
+    threads: 1
+    params:
+        evaluation=as_json(STUDY.evaluation.model_dump()),
+        environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
+        root_seed=STUDY.root_seed,
+        code=code("evaluate_long"),
+    script:
+        "../scripts/evaluate_long.py"
+
+
 rule evaluate_controllers:
     output:
         "results/controllers.parquet",

@@ -1,5 +1,11 @@
-# From the study's tables to the paper's figures and formatted tables.
-FIGURES = expand("figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=["svg", "pdf", "png"])
+# From the study's tables to the paper's figures, further ones, and formatted tables.
+KINDS = ["svg", "pdf", "png"]
+FIGURES = expand("figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=KINDS)
+FURTHER_FIGURES = expand(
+    "figures/{name}.{kind}",
+    name=["seed_strip", "forest", "success_by_radius", "long_episodes", "lottery"],
+    kind=KINDS,
+)
 FORMATTED_TABLES = expand("results/tables/table_{number}.{kind}", number=[1, 2, 3], kind=["csv", "md"])
 
 
@@ -22,6 +28,29 @@ rule plot_figures:
         code=code("plot_figures"),
     script:
         "../scripts/plot_figures.py"
+
+
+rule plot_further:
+    input:
+        **PUBLISHED,
+        runs="results/runs.parquet",
+        cells="results/cells.parquet",
+        comparisons="results/comparisons.parquet",
+        radii="results/radii.parquet",
+        lengths="results/lengths.parquet",
+        lottery="results/lottery.csv",
+    output:
+        FURTHER_FIGURES,
+    log:
+        "results/logs/plot_further.log",
+    benchmark:
+        "results/benchmarks/plot_further.tsv"
+    threads: 1
+    params:
+        radius=STUDY.evaluation.radius,
+        code=code("plot_further"),
+    script:
+        "../scripts/plot_further.py"
 
 
 rule format_tables:

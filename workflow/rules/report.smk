@@ -14,7 +14,7 @@ rule build_report:
         claims="results/claims.csv",
         controllers="results/controllers.parquet",
         ledger=source("report/claims.yaml"),
-        figures=FIGURES,
+        figures=FIGURES + FURTHER_FIGURES,
         media=MEDIA,
         notebooks=NOTEBOOKS,
         manifests=expand("{block}/manifest.json", block=BLOCKS),
