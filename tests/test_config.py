@@ -125,7 +125,7 @@ def test_a_row_changes_the_settings_of_its_cells_only():
         ("evaluation.radius", math.nan, ["evaluation.radius = nan", "finite"]),
         ("evaluation.radius", math.inf, ["evaluation.radius = inf", "finite"]),
         ("evaluation.episodes", 0, ["evaluation.episodes = 0"]),
-        ("evaluation", [], ["evaluation = []", "dictionary"]),
+        ("evaluation", [], ["evaluation = []", "mapping"]),
         ("grid.0.budgets", [-1], ["grid.0.budgets.0 = -1", "greater than or equal to 1"]),
         ("grid.0.budgets", [2047], ["budget = 2047", ">= 2048"]),
         ("grid.0.budgets", [], ["grid.0.budgets", "at least 1"]),
@@ -154,7 +154,7 @@ def test_a_row_changes_the_settings_of_its_cells_only():
         ("variants.none.schedule", "linear", ["variants.none", "horizon"]),
         ("variants.l2.potential", "l3", ["variants.l2.potential = 'l3'", "'none', 'l2' or 'l2sq'"]),
         ("variants.l2; rm -rf", {"potential": "l2"}, ["l2; rm -rf", "pattern"]),
-        ("variants.l2", None, ["variants.l2 = None", "dictionary"]),
+        ("variants.l2", None, ["variants.l2 = None", "mapping"]),
         ("lr", 0.1, ["lr = 0.1", "allowed: root_seed, seeds"]),
     ],
 )
