@@ -5,13 +5,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 QUICK := --directory build/quick --configfile workflow/quick.yaml
-FROM_TABLES := plot_figures plot_further format_tables run_notebook build_report
+FROM_TABLES := plot_figures plot_further format_tables run_notebook
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report test check clean
+.PHONY: help setup reproduce quick report compare reference test check clean bench
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -36,10 +36,24 @@ quick: $(READY) ## the same at toy scale, into build/quick/
 	snakemake $(QUICK) --quiet rules
 	@echo "The report: $(CURDIR)/build/quick/report/report.html"
 
-report: $(READY) ## figures, tables, notebooks and report again from existing results, no training
+report: $(READY) ## figures, tables, notebooks and report again: of results/, or of the reference run where there are none
+ifneq ($(wildcard results/runs.parquet),)
 	@python workflow/unlock.py .
-	snakemake --allowed-rules $(FROM_TABLES) --forcerun run_notebook build_report --quiet rules -- report/report.html
+	snakemake --allowed-rules $(FROM_TABLES) build_report --forcerun run_notebook build_report --quiet rules -- report/report.html
 	@echo "The report: $(CURDIR)/report/report.html"
+else
+	@mkdir -p build/reference/results
+	@cp -p report/reference/* build/reference/results/
+	@python workflow/unlock.py build/reference
+	snakemake --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report --quiet rules -- report/reference.html
+	@echo "The report of the reference run: $(CURDIR)/build/reference/report/reference.html"
+endif
+
+compare: $(READY) ## the run in results/ against the reference run, cell by cell
+	@python workflow/compare_reference.py
+
+reference: $(READY) ## make the run in results/ the reference run: report/reference/ and the README's headline
+	@python workflow/keep_reference.py
 
 test: $(READY) ## the tests
 	python -m pytest

@@ -32,3 +32,29 @@ rule build_report:
         code=code("build_report"),
     script:
         "../scripts/build_report.py"
+
+
+# The report of the reference run, from the tables kept in the repository: no block and no video is needed. The tables
+# must lie under results/ (see `make report`).
+use rule build_report as build_reference_report with:
+    input:
+        TABLES,
+        FORMATTED_TABLES,
+        **PUBLISHED,
+        runs="results/runs.parquet",
+        cells="results/cells.parquet",
+        correlation="results/correlation.csv",
+        claims="results/claims.csv",
+        controllers="results/controllers.parquet",
+        ledger=source("report/claims.yaml"),
+        figures=FIGURES + FURTHER_FIGURES,
+        media=[],
+        notebooks=NOTEBOOKS,
+        manifests=source("report/reference/manifest.json"),
+        template=source("report/report.html.j2"),
+    output:
+        "report/reference.html",
+    log:
+        "results/logs/build_reference_report.log",
+    benchmark:
+        "results/benchmarks/build_reference_report.tsv"

@@ -11,7 +11,10 @@ from reacher_shaping import artifacts, report, tables
 
 given, params = snakemake.input, snakemake.params
 
+manifests = [given.manifests] if isinstance(given.manifests, str) else given.manifests
+
 with logged(snakemake.log[0]):
+    records = [artifacts.read_json(path) for path in manifests]
     inputs = report.Inputs(
         study=json.loads(params.study),
         settings_hash=params.settings_hash,
@@ -25,7 +28,7 @@ with logged(snakemake.log[0]):
         figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},
         media=[Path(path) for path in given.media],
         notebooks=[Path(path) for path in given.notebooks],
-        manifests=[artifacts.read_json(path) for path in given.manifests],
+        manifests=[block for record in records for block in record.get("blocks", [record])],
         template=Path(given.template),
     )
     artifacts.write_text(snakemake.output[0], report.build(inputs))

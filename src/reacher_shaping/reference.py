@@ -1,0 +1,123 @@
+"""The reference run: its summaries, kept in the repository, and how another run compares with it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats as scipy_stats
+
+from reacher_shaping import answers, artifacts, stats, tables
+from reacher_shaping.aggregate import KEY
+
+TABLES = {
+    "runs.parquet": artifacts.RUNS,
+    "cells.parquet": artifacts.CELLS,
+    "curves.parquet": artifacts.CURVES,
+    "correlation.csv": artifacts.CORRELATION,
+    "correlation_published.csv": artifacts.CORRELATION,
+    "claims.csv": artifacts.CLAIMS,
+    "claim_parts.csv": artifacts.CLAIM_PARTS,
+    "controllers.parquet": artifacts.CONTROLLERS,
+    "radii.parquet": artifacts.RADII,
+    "long_episodes.parquet": artifacts.ALL_LONG_EPISODES,
+    "lengths.parquet": artifacts.LENGTHS,
+    "comparisons.parquet": artifacts.COMPARISONS,
+    "variance.parquet": artifacts.VARIANCE,
+    "power.parquet": artifacts.POWER,
+    "lottery.csv": artifacts.LOTTERY,
+    "winners.csv": artifacts.WINNERS,
+    "spread.csv": artifacts.SPREAD,
+}
+"""The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
+
+COMPARED = ("success_rate", "mean_return")
+LEVEL = 0.05
+_BLOCK = re.compile(r"(<!-- reference: begin -->\n).*(<!-- reference: end -->)", re.DOTALL)
+
+
+def compare(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
+    """Set two runs of a study side by side: a row per common cell and metric, ours less the reference.
+
+    The seeds of the two may differ, so the difference of means has Welch's interval, and its p value is
+    Holm-corrected over all rows. Columns: the cell's key, metric, ours, reference, difference, ci_low, ci_high, p,
+    p_holm; p is NaN with fewer than two seeds on a side, and 1 where the runs are the same.
+    """
+    by_cell = dict(iter(reference.groupby(KEY)))
+    rows = []
+    for key, own in runs.groupby(KEY):
+        if key not in by_cell:
+            continue
+        for metric in COMPARED:
+            ours, theirs = (stats.finite(frame[metric]) for frame in (own, by_cell[key]))
+            low, high = stats.welch_interval(ours, theirs)
+            difference = stats.mean(ours) - stats.mean(theirs)
+            values = (stats.mean(ours), stats.mean(theirs), difference, low, high, _p(ours, theirs))
+            rows.append((*key, metric, *values))
+    columns = [*KEY, "metric", "ours", "reference", "difference", "ci_low", "ci_high", "p"]
+    frame = pd.DataFrame(rows, columns=columns)
+    return frame.assign(p_holm=stats.holm(frame["p"].to_numpy(dtype=float)))
+
+
+def _p(ours: np.ndarray[Any, Any], theirs: np.ndarray[Any, Any]) -> float:
+    if min(ours.size, theirs.size) < 2:
+        return float("nan")
+    if np.array_equal(ours, theirs) or np.ptp(ours) == np.ptp(theirs) == 0:
+        return 1.0 if ours.mean() == theirs.mean() else 0.0
+    return float(scipy_stats.ttest_ind(ours, theirs, equal_var=False).pvalue)
+
+
+def agreement(compared: pd.DataFrame) -> str:
+    """Say in one line whether two runs agree beyond seed noise."""
+    tested = compared.dropna(subset="p_holm")
+    if tested.empty:
+        return "Cannot tell: no cell has two seeds in both runs."
+    apart = tested[tested["p_holm"] < LEVEL]
+    cells = len(tested.groupby(KEY))
+    if apart.empty:
+        return f"The runs agree: none of {cells} cells differs beyond seed noise (Welch, Holm-corrected, 5 %)."
+    names = ", ".join("/".join(str(part) for part in key) for key, _ in apart.groupby(KEY))
+    return f"The runs differ beyond seed noise in {len(apart.groupby(KEY))} of {cells} cells: {names}."
+
+
+def manifest(settings: Mapping[str, Any], settings_hash: str, blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what the reference run was: the study's settings and each block's record, without its inputs."""
+    kept = ("seeds", "git", "machine", "threads", "versions", "wall_seconds", "cpu_seconds", "env_steps", "outputs")
+    records = [{name: block[name] for name in (*kept, "env_steps_per_second") if name in block} for block in blocks]
+    return {"study": settings, "settings_hash": settings_hash, "blocks": records}
+
+
+def headline(
+    cells: pd.DataFrame, claims: pd.DataFrame, published: pd.DataFrame, record: Mapping[str, Any], figure: str
+) -> str:
+    """Return the README's account of the reference run as Markdown.
+
+    `record` comes from `manifest`; `figure` is the path of the headline figure.
+    """
+    summary = answers.summary(cells, claims)
+    questions = [f"- {answer.question} **{answer.short}**" for answer in summary.answers]
+    table = tables.to_markdown(tables.table_1(cells, published), "The six best cells of the main grid:")
+    picture = f"![Success rate of every cell, with intervals and the published values]({figure})"
+    parts = [" ".join(summary.headline), "\n".join(questions), picture, table.strip(), _facts(record)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _facts(record: Mapping[str, Any]) -> str:
+    """Say in one sentence what the reference run was and what it took."""
+    blocks = record["blocks"]
+    seeds = sorted({seed for block in blocks for seed in block["seeds"]})
+    commits = ", ".join(sorted({str(block["git"]["commit"])[:12] for block in blocks}))
+    steps = sum(block["env_steps"] for block in blocks)
+    hours = sum(block["cpu_seconds"] for block in blocks) / 3600
+    return (
+        f"The reference run: {len(seeds)} seeds a cell, {steps / 1e6:.0f} million environment steps of training in "
+        f"{hours:.1f} core hours, code {commits}; its tables and manifest are in `report/reference/`."
+    )
+
+
+def put_headline(readme: str, text: str) -> str:
+    """Return the README with `text` between its reference marks. Raises ValueError where the marks are missing."""
+    if not _BLOCK.search(readme):
+        raise ValueError("README.md: the marks <!-- reference: begin --> and <!-- reference: end --> are missing")
+    return _BLOCK.sub(lambda found: f"{found[1]}{text}{found[2]}", readme)

@@ -1,0 +1,82 @@
+"""The reference run in the repository, what the README says of it, and the comparison with another run."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from reacher_shaping import artifacts, bars, reference, style, tables
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "report" / "reference"
+needs_reference = pytest.mark.skipif(not (KEPT / "manifest.json").exists(), reason="no reference run is kept")
+
+
+def read(name):
+    return artifacts.read_table(KEPT / name, reference.TABLES[name])
+
+
+def published():
+    return tables.published_cells(*(pd.read_csv(ROOT / f"report/published/table{number}.csv") for number in (2, 3)))
+
+
+def make_runs(shift=0.0, seeds=6, first=0):
+    rows = []
+    for variant, base in (("none", 0.3), ("l2", 0.25)):
+        for seed in range(first, first + seeds):
+            rate = base + 0.01 * ((7 * seed) % 5) + (shift if variant == "l2" else 0.0)
+            key = {"protocol": "paper", "variant": variant, "budget": 500_000, "alpha0": 1.0, "seed": seed}
+            rows.append(key | {"success_rate": rate, "mean_return": -10 - 10 * rate})
+    return pd.DataFrame(rows)
+
+
+@needs_reference
+def test_readme_says_what_the_reference_tables_hold():
+    record = json.loads((KEPT / "manifest.json").read_text())
+    text = reference.headline(
+        read("cells.parquet"), read("claims.csv"), published(), record, "report/reference/headline.svg"
+    )
+    assert reference.put_headline((ROOT / "README.md").read_text(), text) == (ROOT / "README.md").read_text()
+
+
+@needs_reference
+def test_headline_figure_is_drawn_from_the_reference_tables(tmp_path):
+    figure = bars.figure_2(read("cells.parquet"), published(), controllers=read("controllers.parquet"))
+    style.save(figure, tmp_path / "figure_2")
+    assert (tmp_path / "figure_2.svg").read_text() == (KEPT / "headline.svg").read_text()
+
+
+@needs_reference
+def test_reference_cells_are_the_means_of_its_runs():
+    runs, cells = read("runs.parquet"), read("cells.parquet")
+    means = runs.groupby(["variant", "budget", "alpha0"])["success_rate"].mean()
+    kept = cells.set_index(["variant", "budget", "alpha0"])["success_rate"]
+    assert np.allclose(means, kept.loc[means.index], rtol=0, atol=1e-12)
+    assert len(cells) == 23
+    assert (cells["seeds"] == runs.groupby(["variant", "budget", "alpha0"]).size().iloc[0]).all()
+
+
+def test_a_run_agrees_with_itself_and_with_other_seeds_of_the_same_kind():
+    assert reference.agreement(reference.compare(make_runs(), make_runs())).startswith("The runs agree: none of 2")
+    assert reference.agreement(reference.compare(make_runs(), make_runs(first=100))).startswith("The runs agree")
+
+
+def test_a_shifted_cell_is_named():
+    compared = reference.compare(make_runs(shift=0.2), make_runs(first=3))
+    assert "differ beyond seed noise in 1 of 2 cells: paper/l2/500000/1.0" in reference.agreement(compared)
+    row = compared[(compared["variant"] == "l2") & (compared["metric"] == "success_rate")].iloc[0]
+    assert row["difference"] == pytest.approx(0.2, abs=0.02)
+    assert row["ci_low"] < row["difference"] < row["ci_high"]
+
+
+def test_one_seed_cannot_tell():
+    assert reference.agreement(reference.compare(make_runs(seeds=1), make_runs())).startswith("Cannot tell")
+
+
+def test_headline_goes_between_its_marks_and_needs_them():
+    readme = "a\n<!-- reference: begin -->\nold\n<!-- reference: end -->\nb\n"
+    assert reference.put_headline(readme, "new \\1\n") == readme.replace("old", "new \\1")
+    with pytest.raises(ValueError, match="marks"):
+        reference.put_headline("no marks", "new")

@@ -1,0 +1,46 @@
+"""Make the run in `results/` the reference run: keep its summaries, and tell them in the README.
+
+python workflow/keep_reference.py
+"""
+
+import hashlib
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pandas as pd
+
+from reacher_shaping import artifacts, reference, tables
+from reacher_shaping.config import block_name, load_study
+
+RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
+FIGURE = "headline.svg"
+
+
+def main() -> None:
+    study = load_study("config.yaml")
+    folders = [RESULTS / cell.folder / block_name(seeds) for cell in study.cells for seeds in study.blocks()]
+    blocks = [artifacts.read_json(folder / "manifest.json") for folder in folders]
+    KEPT.mkdir(parents=True, exist_ok=True)
+    for name, table in reference.TABLES.items():
+        artifacts.write_table(KEPT / name, artifacts.read_table(RESULTS / name, table), table)
+    settings = study.model_dump(mode="json")
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
+    record = reference.manifest(settings, digest, blocks)
+    artifacts.write_json(KEPT / "manifest.json", record)
+    shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
+
+    cells = artifacts.read_table(KEPT / "cells.parquet", artifacts.CELLS)
+    claims = artifacts.read_table(KEPT / "claims.csv", artifacts.CLAIMS)
+    published = tables.published_cells(*(pd.read_csv(f"report/published/table{number}.csv") for number in (2, 3)))
+    text = reference.headline(cells, claims, published, record, f"{KEPT}/{FIGURE}")
+    artifacts.write_text(README, reference.put_headline(README.read_text(encoding="utf-8"), text))
+    print(f"The reference run: {KEPT} and README.md")
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (artifacts.ArtifactError, OSError, ValueError) as error:
+        sys.exit(f"{error}")
