@@ -23,6 +23,7 @@ STUDY = or_stop(load_study, config)
 
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/peers.smk"
 include: "workflow/rules/analyse.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/notebooks.smk"

@@ -175,8 +175,8 @@ def test_correlation_frame_keeps_appendix_and_protocols_apart():
 
 
 def test_radius_frame_counts_from_the_distances():
-    key, progress, episodes = make_block(seeds=(0,))
-    frame = aggregate.radius_frame([(key, progress, episodes)]).set_index(["mode", "radius"])
+    key, _, episodes = make_block(seeds=(0,))
+    frame = aggregate.radius_frame([(key, episodes)]).set_index(["mode", "radius"])
     own = episodes[episodes["mode"] == "stochastic"]
     assert frame.loc[("stochastic", 0.02), "success_rate"] == own["success"].mean()
     assert frame.loc[("stochastic", 0.05), "final_success_rate"] == np.mean(own["final_distance"] <= 0.05)
@@ -185,7 +185,8 @@ def test_radius_frame_counts_from_the_distances():
 
 
 def test_radius_cells_average_over_seeds():
-    radius = aggregate.radius_frame([make_block(seeds=range(4))])
+    key, _, episodes = make_block(seeds=range(4))
+    radius = aggregate.radius_frame([(key, episodes)])
     cells = aggregate.radius_cells(radius, 0)
     at = (radius["mode"] == "stochastic") & (radius["radius"] == 0.03)
     row = cells[(cells["mode"] == "stochastic") & (cells["radius"] == 0.03)].iloc[0]

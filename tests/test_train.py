@@ -73,7 +73,7 @@ def test_three_iterations_equal_the_plain_loop(of):
         assert error < 0.01 * moved(network, of, 1)
         episodes = len(recording.reward) // 50
         expected = recording.reward[: 50 * episodes].reshape(episodes, 50).sum(axis=1)
-        np.testing.assert_allclose(state.episode_returns[-1][1], expected, rtol=1e-4)
+        np.testing.assert_allclose(state.episode_returns[1, state.iteration - 1], expected, rtol=1e-4)
 
 
 def test_an_iteration_of_the_papers_size_equals_the_plain_loop():
@@ -159,7 +159,7 @@ def test_seeds_and_roots_give_different_runs_and_variants_share_their_first_roll
     assert not torch.equal(rows[0], rows[1])
     assert not torch.equal(rows[0], rows[2])
     none, l2 = (trained(small(variant), [0], iterations=1) for variant in ("none", "l2"))
-    np.testing.assert_array_equal(none.episode_returns[0], l2.episode_returns[0])
+    np.testing.assert_array_equal(none.episode_returns[:, 0], l2.episode_returns[:, 0])
     assert not torch.equal(none.rows, l2.rows)
 
 
@@ -193,7 +193,7 @@ def test_frames_have_a_row_per_seed_and_iteration_and_per_training_episode():
 def test_the_returns_of_every_seed_rise_far_beyond_their_noise():
     of = cell("none", iterations=20, rollout_steps=1024, minibatch_size=128, learning_rate=1e-3)
     state = trained(of, [0, 1])
-    returns = np.stack(state.episode_returns, axis=1)  # [S, iterations, episodes]
+    returns = state.episode_returns  # [S, iterations, episodes]
     first, last = returns[:, :3].reshape(2, -1), returns[:, -3:].reshape(2, -1)
     noise = np.sqrt((first.var(axis=1) + last.var(axis=1)) / first.shape[1])
     gain = last.mean(axis=1) - first.mean(axis=1)

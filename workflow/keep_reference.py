@@ -12,14 +12,15 @@ from pathlib import Path
 import pandas as pd
 
 from reacher_shaping import artifacts, reference, tables
-from reacher_shaping.config import block_name, load_study
+from reacher_shaping.config import block_name, load_study, require_mapping
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
 
 
 def main() -> None:
-    study = load_study("config.yaml")
+    overlay = require_mapping(sys.argv[1]) if len(sys.argv) > 1 else {}
+    study = load_study({**require_mapping("config.yaml"), **overlay})
     folders = [RESULTS / cell.folder / block_name(seeds) for cell in study.cells for seeds in study.blocks()]
     blocks = [artifacts.read_json(folder / "manifest.json") for folder in folders]
     KEPT.mkdir(parents=True, exist_ok=True)

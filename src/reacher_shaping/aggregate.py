@@ -196,13 +196,15 @@ def correlation_frame(runs: pd.DataFrame, root_seed: int) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def radius_frame(blocks: Iterable[Block], radii: Sequence[float] = RADII) -> pd.DataFrame:
-    """Success against radius: a row per cell, seed, mode and radius (metres, inclusive).
+def radius_frame(
+    blocks: Iterable[tuple[Mapping[str, Any], pd.DataFrame]], radii: Sequence[float] = RADII
+) -> pd.DataFrame:
+    """Success against radius: a row per cell, seed, mode and radius (metres, inclusive), from (key, episodes) pairs.
 
     `success_rate`: within the radius at any step; `final_success_rate`: at the last one.
     """
     parts = []
-    for key, _, episodes in blocks:
+    for key, episodes in blocks:
         groups = [episodes["seed"], episodes["mode"]]
         for radius in radii:
             hits = (episodes[["min_distance", "final_distance"]] <= radius).groupby(groups).mean().reset_index()

@@ -141,6 +141,7 @@ COMPARISONS = Table(
     | {"seeds": INTEGER},
     measures=True,
 )
+PEERS = Table({"algorithm": TEXT, "seed": INTEGER, "budget": INTEGER}, measures=True)
 VARIANCE = Table({**_CELL, "seeds": INTEGER}, measures=True)
 POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)
 LOTTERY = Table({"statement": TEXT}, measures=True)

@@ -25,7 +25,7 @@ from pydantic import (
     model_validator,
 )
 
-RESERVED_FOLDERS = frozenset({"benchmarks", "logs", "media", "notebooks", "tables"})
+RESERVED_FOLDERS = frozenset({"benchmarks", "logs", "media", "notebooks", "peers", "tables"})
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$", max_length=40)]
 Count = Annotated[int, Field(ge=1, le=10**12)]
@@ -183,6 +183,13 @@ class Evaluation(Settings):
     radius: Positive = 0.02
 
 
+class Peers(Settings):
+    """The optional comparison with Stable-Baselines3: environment steps of each algorithm, and runs of each."""
+
+    seeds: Annotated[int, Field(ge=1, le=1000)] = 3
+    budgets: Annotated[dict[Literal["ppo", "sac", "td3"], Annotated[int, Field(ge=100, le=10**9)]], Field(min_length=1)]
+
+
 class Row(Settings):
     """One row of the grid: every variant x budget x alpha0, with optional changes to the protocol's settings."""
 
@@ -224,6 +231,7 @@ class Study(Settings):
         tuple[Row, ...], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v), Field(min_length=1)
     ]
     evaluation: Evaluation
+    peers: Peers
 
     @model_validator(mode="after")
     def _grid_is_possible(self) -> Self:

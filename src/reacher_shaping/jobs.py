@@ -69,8 +69,9 @@ def save_checkpoint(path: Path, state: TrainState) -> None:
         "iteration": state.iteration,
         "rows": state.rows,
         "adam": {"first": state.adam.first, "second": state.adam.second, "steps": state.adam.steps},
-        "progress": [{name: torch.from_numpy(value) for name, value in row.items()} for row in state.progress],
-        "episode_returns": [torch.from_numpy(returns) for returns in state.episode_returns],
+        "progress": {name: torch.from_numpy(values) for name, values in state.progress.items()},
+        "episode_returns": torch.from_numpy(state.episode_returns),
+        "rollout_steps": state.rollout_steps,
     }
     buffer = io.BytesIO()
     torch.save(content, buffer)
@@ -86,8 +87,9 @@ def load_checkpoint(path: Path) -> TrainState:
             rows=content["rows"],
             adam=Adam(**content["adam"]),
             iteration=content["iteration"],
-            progress=[{name: value.numpy() for name, value in row.items()} for row in content["progress"]],
-            episode_returns=[returns.numpy() for returns in content["episode_returns"]],
+            progress={name: values.numpy() for name, values in content["progress"].items()},
+            episode_returns=content["episode_returns"].numpy(),
+            rollout_steps=content["rollout_steps"],
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise artifacts.ArtifactError(path, f"is no checkpoint ({error!r})") from None

@@ -5,7 +5,7 @@ progress, keep a checkpoint, stop), and a state is all it takes to go on.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,25 +25,57 @@ Array = NDArray[np.float64]
 Rows = dict[str, NDArray[Any]]
 
 
+MEASURES = (
+    "episode_return",
+    "shaped_return",
+    "episode_length",
+    "success_rate",
+    "final_distance",
+    "action_std",
+    "entropy",
+    "approx_kl",
+    "clip_fraction",
+    "policy_loss",
+    "value_loss",
+    "explained_variance",
+)
+"""The measures of an iteration, in the order of `progress.parquet`."""
+
+
 @dataclass
 class TrainState:
-    """All that a run is after `iteration` iterations; `progress` and `episodes` grow by one entry each.
+    """All that a run is after `iteration` of its I iterations.
+
+    The logs have their full size from the start: arrays kept from each iteration would lie between those that are
+    freed and fragment the memory.
 
     Attributes:
         seeds: run seeds of the block.
         rows: [S, P] parameters.
         adam: Adam's state.
+        progress: [S, I] of each of `MEASURES`, NaN from `iteration` on.
+        episode_returns: [S, I, E] unshaped returns of the episodes that reached the time limit.
+        rollout_steps: environment steps of an iteration.
         iteration: iterations done.
-        progress: per iteration, the columns of `progress.parquet`, [S] each.
-        episode_returns: per iteration, [S, E] unshaped returns of the episodes that reached the time limit.
     """
 
     seeds: tuple[int, ...]
     rows: Tensor
     adam: ppo.Adam
+    progress: Rows
+    episode_returns: Array
+    rollout_steps: int
     iteration: int = 0
-    progress: list[Rows] = field(default_factory=list)
-    episode_returns: list[Array] = field(default_factory=list)
+
+    @classmethod
+    def start(cls, cell: Cell, seeds: Sequence[int]) -> "TrainState":
+        """Return the state before the first iteration."""
+        settings = cell.protocol.ppo
+        rows = initialise(seeds, cell.root_seed, settings.hidden_units)
+        shape = (len(seeds), cell.iterations)
+        progress = {name: np.full(shape, np.nan) for name in MEASURES}
+        returns = np.full((*shape, Plan(settings.rollout_steps).episodes), np.nan)
+        return cls(tuple(seeds), rows, ppo.Adam.zeros_like(rows), progress, returns, settings.rollout_steps)
 
     def policy(self, cell: Cell) -> Policy:
         """Return the policy as trained so far."""
@@ -56,26 +88,32 @@ class TrainState:
 
     def progress_frame(self) -> pd.DataFrame:
         """Return `progress.parquet`: a row per seed and iteration, ordered by seed."""
-        columns = {name: np.stack([row[name] for row in self.progress], axis=1).ravel() for name in self.progress[0]}
-        return pd.DataFrame(columns)
+        iterations = np.tile(np.arange(1, self.iteration + 1), len(self.seeds))
+        return pd.DataFrame(
+            {
+                "seed": np.repeat(self.seeds, self.iteration),
+                "iteration": iterations,
+                "env_steps": iterations * self.rollout_steps,
+                **{name: values[:, : self.iteration].ravel() for name, values in self.progress.items()},
+            }
+        )
 
     def episodes_frame(self) -> pd.DataFrame:
         """Return the training episodes, a row each: seed, iteration, episode_return, episode_length, env_steps.
 
         `env_steps` counts the environment steps of training done when the episode ended.
         """
-        returns = np.stack(self.episode_returns, axis=1)
+        returns = self.episode_returns[:, : self.iteration]
         seeds, iterations, episodes = returns.shape
-        steps = np.stack([row["env_steps"] for row in self.progress], axis=1)
-        start = np.concatenate([np.zeros_like(steps[:, :1]), steps[:, :-1]], axis=1)
-        end = start[..., None] + EPISODE_STEPS * np.arange(1, episodes + 1)
+        iteration = np.tile(np.repeat(np.arange(iterations), episodes), seeds)
+        within = np.tile(EPISODE_STEPS * np.arange(1, episodes + 1), seeds * iterations)
         return pd.DataFrame(
             {
                 "seed": np.repeat(self.seeds, iterations * episodes),
-                "iteration": np.tile(np.repeat(np.arange(1, iterations + 1), episodes), seeds),
+                "iteration": iteration + 1,
                 "episode_return": returns.ravel(),
                 "episode_length": EPISODE_STEPS,
-                "env_steps": end.ravel(),
+                "env_steps": iteration * self.rollout_steps + within,
             }
         )
 
@@ -95,9 +133,7 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
     torch.set_flush_denormal(True)
     settings = cell.protocol.ppo
     plan = Plan(settings.rollout_steps)
-    if state is None:
-        rows = initialise(seeds, cell.root_seed, settings.hidden_units)
-        state = TrainState(tuple(seeds), rows, ppo.Adam.zeros_like(rows))
+    state = state or TrainState.start(cell, seeds)
     learner = ppo.Learner(state.rows, settings, state.adam)
     collector = Collector(seeds, cell.root_seed, plan, clip_actions=cell.protocol.environment.clip_actions)
     policy = state.policy(cell)
@@ -105,19 +141,16 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
         rollout = collector.collect(policy, state.iteration)
         records, summary = prepare(cell, policy, rollout, plan, state.iteration, radius)
         learner.update(records, _shuffles(cell, seeds, state.iteration))
-        state.iteration += 1
         losses = ppo.diagnose(learner.network, records, settings.clip_range)
-        state.episode_returns.append(summary.pop("episode_returns"))
-        state.progress.append(
-            {
-                "seed": np.array(seeds),
-                "iteration": np.full(len(seeds), state.iteration),
-                "env_steps": np.full(len(seeds), state.iteration * settings.rollout_steps),
-                **summary,
-                "action_std": learner.network.log_std.exp().mean((1, 2)).double().numpy(),
-                **{name: value.double().numpy() for name, value in losses._asdict().items()},
-            }
-        )
+        measured = {
+            **summary,
+            "action_std": learner.network.log_std.exp().mean((1, 2)),
+            **losses._asdict(),
+        }
+        state.episode_returns[:, state.iteration] = measured.pop("episode_returns")
+        for name, values in measured.items():
+            state.progress[name][:, state.iteration] = values
+        state.iteration += 1
         yield state
 
 

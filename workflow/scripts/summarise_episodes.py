@@ -9,7 +9,7 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
     episodes = (
-        (cell, None, artifacts.read_table(path, artifacts.EPISODES))
+        (cell, artifacts.read_table(path, artifacts.EPISODES))
         for cell, path in zip(params.cells, given.episodes, strict=True)
     )
     radii = aggregate.radius_cells(aggregate.radius_frame(episodes), params.root_seed)

@@ -1,0 +1,89 @@
+"""Does the engine learn what the plain loop learns? Both train one cell; their final policies are compared.
+
+    python benchmarks/learning.py --variant none --budget 500000 --seeds 3 --out benchmarks/learning.json
+
+The plain loop (tests/plain_loop.py) has the engine's random streams, so a seed starts from the same numbers in both and
+drifts apart only by rounding, which training amplifies: after a whole run the two are samples of one distribution.
+The engine trains ten seeds in the time of a fraction of one plain run.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy import stats
+
+from reacher_shaping.config import load_study
+from reacher_shaping.evaluate import evaluate
+from reacher_shaping.policy import Policy
+from reacher_shaping.train import train
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+import plain_loop  # noqa: E402
+
+ENGINE_SEEDS = 10
+
+
+def measures(policy, seeds, cell, study):
+    """Success rate and mean return of each seed [S] over the study's evaluation."""
+    episodes = evaluate(
+        policy.act,
+        seeds,
+        mode="stochastic",
+        episodes=study.evaluation.episodes,
+        radius=study.evaluation.radius,
+        control_weight=cell.protocol.environment.control_weight,
+        root_seed=cell.root_seed,
+    ).groupby("seed")
+    return {
+        "success_rate": episodes["success"].mean().to_list(),
+        "mean_return": episodes["episode_return"].mean().to_list(),
+    }
+
+
+def plain_policy(cell, seed):
+    """Train one seed in the plain loop, say how it goes, and return its policy."""
+    begun, network = time.monotonic(), None
+    for done, (network, _) in enumerate(plain_loop.train(cell, seed), start=1):  # noqa: B007  # the last is kept
+        if done % 20 == 0 or done == cell.iterations:
+            left = (time.monotonic() - begun) / done * (cell.iterations - done)
+            print(f"plain loop, seed {seed}: iteration {done}/{cell.iterations}, {left / 60:.1f} min left", flush=True)
+    return Policy.from_weights({name: tensor.detach()[None] for name, tensor in network.state_dict().items()})
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--variant", default="none")
+    parser.add_argument("--budget", type=int, default=500_000)
+    parser.add_argument("--seeds", type=int, default=3, help="of the plain loop")
+    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "learning.json")
+    given = parser.parse_args()
+    torch.set_num_threads(1)
+    study = load_study(ROOT / "config.yaml")
+    cell = next(cell for cell in study.cells if (cell.variant.name, cell.budget) == (given.variant, given.budget))
+
+    plain = {"success_rate": [], "mean_return": []}
+    for seed in range(given.seeds):
+        for name, values in measures(plain_policy(cell, seed), [seed], cell, study).items():
+            plain[name] += values
+    *_, state = train(cell, range(ENGINE_SEEDS), radius=study.evaluation.radius)
+    engine = measures(state.policy(cell), list(range(ENGINE_SEEDS)), cell, study)
+
+    found = {"cell": cell.name, "plain": plain, "engine": engine, "welch_p": {}}
+    for name in plain:
+        found["welch_p"][name] = float(stats.ttest_ind(plain[name], engine[name], equal_var=False).pvalue)
+        rows = (("plain loop", plain[name]), ("engine", engine[name]))
+        for label, values in rows:
+            spread = np.std(values, ddof=1) if len(values) > 1 else float("nan")
+            print(f"{name}, {label}: {np.mean(values):.3f} (sd {spread:.3f}, {len(values)} seeds)")
+        print(f"{name}: Welch p = {found['welch_p'][name]:.2f}")
+    given.out.write_text(json.dumps(found, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

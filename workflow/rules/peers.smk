@@ -1,0 +1,46 @@
+# Other algorithms on the same task, an optional target: `snakemake peers`. Once made, they are part of the report.
+PEER_RUNS = expand(
+    "results/peers/{algorithm}/seed{seed}.parquet", algorithm=STUDY.peers.budgets, seed=range(STUDY.peers.seeds)
+)
+
+
+rule peers:
+    input:
+        PEER_RUNS,
+        "results/peers.parquet",
+
+
+rule train_peer:
+    output:
+        "results/peers/{algorithm}/seed{seed}.parquet",
+    log:
+        "results/logs/peers/{algorithm}-{seed}.log",
+    benchmark:
+        "results/benchmarks/peers/{algorithm}-{seed}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        budget=lambda wildcards: STUDY.peers.budgets[wildcards.algorithm],
+        protocol=as_json(STUDY.cells[0].protocol.model_dump()),
+        evaluation=as_json(STUDY.evaluation.model_dump()),
+        root_seed=STUDY.root_seed,
+        code=code("train_peer"),
+    script:
+        "../scripts/train_peer.py"
+
+
+rule gather_peers:
+    input:
+        PEER_RUNS,
+    output:
+        "results/peers.parquet",
+    log:
+        "results/logs/gather_peers.log",
+    benchmark:
+        "results/benchmarks/gather_peers.tsv"
+    threads: 1
+    params:
+        code=code("gather_peers"),
+    script:
+        "../scripts/gather_peers.py"

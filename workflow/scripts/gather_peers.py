@@ -1,0 +1,10 @@
+"""Put the peers' runs into one table."""
+
+import pandas as pd
+from job import logged
+
+from reacher_shaping import artifacts
+
+with logged(snakemake.log[0]):
+    runs = [artifacts.read_table(path, artifacts.PEERS) for path in snakemake.input]
+    artifacts.write_table(snakemake.output[0], pd.concat(runs, ignore_index=True), artifacts.PEERS)

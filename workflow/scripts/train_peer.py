@@ -1,0 +1,19 @@
+"""Train and evaluate one run of another algorithm."""
+
+from job import logged
+
+from reacher_shaping import artifacts, peers
+from reacher_shaping.config import Evaluation, Protocol
+
+params, wildcards = snakemake.params, snakemake.wildcards
+
+with logged(snakemake.log[0]):
+    run = peers.peer_run(
+        wildcards.algorithm,
+        int(wildcards.seed),
+        params.budget,
+        Protocol.model_validate_json(params.protocol),
+        Evaluation.model_validate_json(params.evaluation),
+        params.root_seed,
+    )
+    artifacts.write_table(snakemake.output[0], run, artifacts.PEERS)
