@@ -11,7 +11,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare reference test check clean bench
+.PHONY: help setup reproduce quick report compare reference test check bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -64,6 +64,14 @@ check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
 	snakefmt --check Snakefile workflow
 	mypy
 	python workflow/lint.py
+
+bench: $(READY) ## speed beside Stable-Baselines3 and the plain loop, into benchmarks/; leave the machine idle meanwhile
+	python benchmarks/run.py
+
+peers: $(READY) ## Stable-Baselines3 PPO, SAC and TD3 on the same task (hours), then the study with them in it
+	@python workflow/unlock.py .
+	snakemake --quiet rules -- peers
+	snakemake --quiet rules
 
 clean: ## removes results, figures, report and build; keeps .venv
 	rm -rf build report/report.html .snakemake
