@@ -11,7 +11,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare reference test check bench peers clean
+.PHONY: help setup reproduce quick report compare verify reference test check bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -51,6 +51,9 @@ endif
 
 compare: $(READY) ## the run in results/ against the reference run, cell by cell
 	@python workflow/compare_reference.py
+
+verify: $(READY) ## are the files in results/ those of their manifests? recomputes the checksums
+	@python workflow/verify.py
 
 reference: $(READY) ## make the run in results/ the reference run: report/reference/ and the README's headline
 	@python workflow/keep_reference.py
