@@ -1,4 +1,4 @@
-"""Draw what the paper does not have: every run, paired differences, other radii, what one seed can show."""
+"""Draw the figures that the paper does not have."""
 
 from pathlib import Path
 
@@ -13,11 +13,14 @@ with logged(snakemake.log[0]):
     runs = artifacts.read_table(given.runs, artifacts.RUNS)
     cells = artifacts.read_table(given.cells, artifacts.CELLS)
     published = tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
-    radius = artifacts.read_table(given.radius, artifacts.RADIUS)
+    comparisons = artifacts.read_table(given.comparisons, artifacts.COMPARISONS)
+    radii = artifacts.read_table(given.radii, artifacts.RADII)
+    lengths = artifacts.read_table(given.lengths, artifacts.LENGTHS)
     figures = {
         "seed_strip": further.seed_strip(runs, cells, published),
-        "forest": further.forest(artifacts.read_table(given.comparisons, artifacts.COMPARISONS)),
-        "success_by_radius": further.success_by_radius(radius, radius=snakemake.params.radius),
+        "forest": further.forest(comparisons),
+        "success_by_radius": further.success_by_radius(radii, radius=snakemake.params.radius),
+        "long_episodes": further.long_episodes(lengths, metric="final_distance"),
         "lottery": further.lottery(artifacts.read_table(given.lottery, artifacts.LOTTERY)),
     }
     for name, figure in figures.items():
