@@ -40,6 +40,7 @@ def trained_block(
     Meanwhile no other process trains with the same folder; the checkpoint is removed once the caller has saved the
     result, that is when the context ends without an exception. `report` gets a line of text now and then.
     """
+    torch.set_num_threads(1)  # a job is one thread, on any machine: the number of threads may change the last bits
     checkpoint = folder / "checkpoint.pt"
     with artifacts.exclusive(folder.with_suffix(".lock")):
         state = load_checkpoint(checkpoint) if checkpoint.exists() else None

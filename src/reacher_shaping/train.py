@@ -129,8 +129,6 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
 
     A seed whose numbers stop being finite is carried on as such and touches no other.
     """
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
     settings = cell.protocol.ppo
     plan = Plan(settings.rollout_steps)
     state = state or TrainState.start(cell, seeds)

@@ -4,7 +4,6 @@
 rule evaluate_block:
     input:
         policy="results/{cell}/{block}/policy.pt",
-        outputs=multiext("results/{cell}/{block}/", progress="progress.parquet", monitor="monitor"),
         training=ancient("results/{cell}/{block}/training.json"),
     output:
         episodes="results/{cell}/{block}/episodes.parquet",
