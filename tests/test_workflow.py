@@ -210,7 +210,7 @@ def test_edit_of_the_update_retrains_every_block(project):
 def test_edit_of_a_plot_redraws_and_does_not_train(project):
     with project.edited("src/reacher_shaping/plots.py", "\n\n\n@mpl", "\n\n\ndef _new():\n    pass\n\n\n@mpl"):
         assert project.planned() == {}
-    with project.edited("src/reacher_shaping/plots.py", "def figure_1(curves", "def figure_1(curves, /"):
+    with project.edited("src/reacher_shaping/plots.py", '"PPO iteration"', '"Iteration"'):
         jobs = project.planned()
     assert {"plot_figures", "build_report"} <= set(jobs) <= {"plot_figures", "run_notebook", "build_report"}
 
