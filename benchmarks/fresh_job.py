@@ -5,7 +5,6 @@ end, when the files are written.
 """
 
 import json
-import resource
 import sys
 import tempfile
 import time
@@ -36,4 +35,6 @@ with tempfile.TemporaryDirectory() as folder:
     with jobs.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
         artifacts.write_policy(block / "policy.pt", list(seeds), state.policy(cell).weights(), {})
         artifacts.write_table(block / "progress.parquet", state.progress_frame(), artifacts.PROGRESS)
-print(json.dumps([*collected[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+# Not getrusage: its peak starts from that of the process that started this one.
+peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+print(json.dumps([*collected[0], int(peak.split()[1]) / 1024]))

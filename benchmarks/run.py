@@ -35,8 +35,10 @@ from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.reacher import EPISODE_STEPS
 
+TRAINED_LOG_STD = -2.2
+"""Policies are evaluated with the spread that training leaves, 0.11; a wide one keeps the arm at its joint limit."""
 BLOCK = 10
-"""Seeds of the study's default block."""
+"""Seeds of the block that the measures are stated for."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Size:
     repeats: int = 5
     seeds: tuple[int, ...] = (1, 2, 5, BLOCK, 20, 40)
     budgets: tuple[int, ...] = (1, 2, 4)  # iterations
-    chunks: int = 4  # of LANES_PER_SEED episodes
+    chunks: int = 10  # of LANES_PER_SEED episodes
     blocks: tuple[int, ...] = (1, 10, 100)  # per cell, for the dry run
     job_iterations: int = 3
     quick: bool = False
@@ -133,11 +135,15 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
     """Evaluation against a loop over gymnasium.make_vec with the same policy."""
     cell, block = size.cell(), size.block
     weight, hidden = cell.protocol.environment.control_weight, cell.protocol.ppo.hidden_units
-    torch.set_flush_denormal(True)
     settings = {"radius": RADIUS, "control_weight": weight, "root_seed": 0, "mode": "stochastic"}
 
+    def policies(seeds: int) -> Policy:
+        stack = Policy(initialise(range(seeds), 0, hidden), hidden)
+        stack.layers.log_std.fill_(TRAINED_LOG_STD)
+        return stack
+
     def ours(seeds: int) -> Workload:
-        policy = Policy(initialise(range(seeds), 0, hidden), hidden)
+        policy = policies(seeds)
 
         def episodes() -> float:
             return EPISODE_STEPS * len(
@@ -146,11 +152,10 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
 
         return episodes
 
-    policy = Policy(initialise([0], 0, hidden), hidden)
     workloads = {
         "block": ours(block),
         "one": ours(1),
-        "make_vec": peers.make_vec_evaluation(policy, weight, LANES_PER_SEED, size.chunks),
+        "make_vec": peers.make_vec_evaluation(policies(1), weight, LANES_PER_SEED, size.chunks),
     }
     rates = take_turns(workloads, size.repeats)
     part = "evaluation"
@@ -218,6 +223,14 @@ def measure_scaling(size: Size) -> Iterator[Measure]:
         yield measure("budget", f"{count} iterations", ratio, f"x time of {size.budgets[0]}")
 
 
+ACCOUNT = """
+import json, resource, subprocess, sys
+subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))
+"""
+
+
 def dry_run(seeds: int, folder: Path) -> tuple[int, float, float]:
     """Let Snakemake plan the study with so many seeds a cell: training jobs, CPU seconds, and peak memory in MB."""
     overlay = folder / "seeds.yaml"
@@ -226,12 +239,12 @@ def dry_run(seeds: int, folder: Path) -> tuple[int, float, float]:
         sys.executable, "-m", "snakemake", "--snakefile", str(HERE.parent / "Snakefile"), "--directory", str(folder),
         "--cores", "1", "--dry-run", "--quiet", "--configfile", str(overlay),
     ]  # fmt: skip
-    planner = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, used = os.wait4(planner.pid, 0)
-    if status:
-        raise RuntimeError(f"failed: {' '.join(command)}")
+    # Started by a small process: the peak that the system reports of a process begins with that of its parent.
+    between = [sys.executable, "-c", ACCOUNT, *command]
+    done = subprocess.run(between, capture_output=True, text=True, check=True)
     jobs = len(load_study(HERE.parent / "config.yaml").cells) * -(-seeds // BLOCK)
-    return jobs, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
+    seconds, memory = json.loads(done.stdout.splitlines()[-1])
+    return jobs, seconds, memory
 
 
 def measure_workflow(size: Size) -> Iterator[Measure]:
