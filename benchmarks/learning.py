@@ -71,6 +71,7 @@ def main():
     for seed in range(given.seeds):
         for name, values in measures(plain_policy(cell, seed), [seed], cell, study).items():
             plain[name] += values
+            print(f"plain loop, seed {seed}: {name} {values[0]:.3f}", flush=True)
     *_, state = train(cell, range(ENGINE_SEEDS), radius=study.evaluation.radius)
     engine = measures(state.policy(cell), list(range(ENGINE_SEEDS)), cell, study)
 
