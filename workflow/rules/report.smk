@@ -6,7 +6,7 @@ import hashlib
 # count as changed. The job that makes it also makes the policy.
 rule build_report:
     input:
-        [name for name in BLOCK_FILES if not name.endswith("/monitor")],
+        [name for name in BLOCK_FILES if not name.endswith("monitor")],
         FORMATTED_TABLES,
         "results/check.txt",
         **PUBLISHED,
