@@ -7,6 +7,7 @@ from unittest.mock import patch
 
 import plain_loop
 import torch
+from peers import as_installed
 
 from reacher_shaping import ppo, rollout
 from reacher_shaping import train as training
@@ -70,13 +71,24 @@ def engine(
     yield from iterator
 
 
+def timed(iterator: Iterator[object]) -> Iterator[object]:
+    """The same iterations with MuJoCo's profiling clock on."""
+    while True:
+        with as_installed():
+            made = next(iterator, None)
+        if made is None:
+            return
+        yield made
+
+
 def rungs(cell: Cell, seeds: Sequence[int]) -> dict[str, tuple[int, Iterator[object]]]:
     """Return the rungs in order: name -> (seeds, iterations of training)."""
     one = seeds[:1]
     return {
-        "plain loop": (1, plain(cell, one)),
-        "+ lanes": (1, engine(cell, one, autograd=True, contacts=True)),
-        "+ stack of seeds": (len(seeds), engine(cell, seeds, autograd=True, contacts=True)),
-        "+ written-out gradient": (len(seeds), engine(cell, seeds, contacts=True)),
-        "+ contacts off": (len(seeds), engine(cell, seeds)),
+        "plain loop": (1, timed(plain(cell, one))),
+        "+ lanes": (1, timed(engine(cell, one, autograd=True, contacts=True))),
+        "+ stack of seeds": (len(seeds), timed(engine(cell, seeds, autograd=True, contacts=True))),
+        "+ written-out gradient": (len(seeds), timed(engine(cell, seeds, contacts=True))),
+        "+ contacts off": (len(seeds), timed(engine(cell, seeds))),
+        "+ profiling clock off": (len(seeds), engine(cell, seeds)),
     }

@@ -20,7 +20,7 @@ PAPER_GRID = [
 TOY_GRID = [("paper", variant, 4096, 1.0) for variant in ("none", "l2", "decay200k")]
 MEASURES = (
     "success_rate", "mean_return", "final_success_rate", "final_distance", "min_distance",
-    "reward_distance", "reward_control", "first_hit_step",
+    "reward_distance", "reward_control", "first_hit_step", "share_within_radius",
 )  # fmt: skip
 
 
@@ -36,6 +36,7 @@ def runs(grid, seeds=10):
             row |= {"mean_return": distance + control, "reward_distance": distance, "reward_control": control}
             row |= {"final_success_rate": success / 3, "final_distance": generator.uniform(0.02, 0.1)}
             row |= {"min_distance": generator.uniform(0.01, 0.03), "first_hit_step": generator.uniform(10, 30)}
+            row |= {"share_within_radius": success / 10}
             row |= {f"deterministic_{name}": row[name] for name in MEASURES}
             row |= {"peak_return": -9.0, "peak_iteration": 200, "final_return": -10.0, "diverged": False}
             rows.append(row)

@@ -29,6 +29,7 @@ def make_block(variant="l2", seeds=(0, 1, 2), iterations=30, episodes=20, level=
             frame["episode_return"] = frame["reward_distance"] + frame["reward_control"]
             frame["first_hit_step"] = pd.array(np.where(frame["success"], 7, -1), dtype="Int64")
             frame.loc[~frame["success"], "first_hit_step"] = pd.NA
+            frame["share_within_radius"] = frame["success"] / 5
             evaluation.append(frame)
     return KEY | {"variant": variant} | key, pd.concat(progress), pd.concat(evaluation)
 
@@ -43,6 +44,7 @@ def test_run_row_holds_the_means_of_its_own_episodes():
     assert row["success_rate"] == own["success"].sum() / 20
     assert row["mean_return"] == pytest.approx(np.average(own["episode_return"]))
     assert row["first_hit_step"] == 7
+    assert row["share_within_radius"] == pytest.approx(row["success_rate"] / 5)
     mean_action = episodes[(episodes["seed"] == 1) & (episodes["mode"] == "deterministic")]
     assert row["deterministic_final_distance"] == pytest.approx(np.average(mean_action["final_distance"]))
     assert row["reward_distance"] + row["reward_control"] == pytest.approx(row["mean_return"])

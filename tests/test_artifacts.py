@@ -24,6 +24,7 @@ def episodes(**columns):
         "first_hit_step": pd.array([3, None], dtype="Int64"),
         "success": [True, False],
         "final_success": [False, False],
+        "share_within_radius": [0.04, 0.0],
     }
     return pd.DataFrame(frame | columns)
 

@@ -11,6 +11,7 @@ import torch
 from cells import small
 from torch.utils.flop_counter import FlopCounterMode
 
+CLOCK_OFF = "+ profiling clock off"
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
@@ -26,14 +27,15 @@ def test_every_rung_of_the_ladder_trains_the_same_weights():
     trained = {name: [next(iterator) for _ in range(2)][-1] for name, (_, iterator) in ladder.rungs(of, [4, 1]).items()}
     network, _ = trained.pop("plain loop")
     expected = network.state_dict()
-    assert list(trained) == ["+ lanes", "+ stack of seeds", "+ written-out gradient", "+ contacts off"]
+    assert list(trained) == ["+ lanes", "+ stack of seeds", "+ written-out gradient", "+ contacts off", CLOCK_OFF]
     for name, state in trained.items():
         weights = state.policy(of).weights()
         for key, tensor in expected.items():
             # Float32 sums in another order; training moves the weights a thousand times as far.
             torch.testing.assert_close(weights[key][0], tensor, rtol=0, atol=2e-5, msg=f"{name}: {key}")
-    last, before = trained["+ contacts off"], trained["+ written-out gradient"]
-    assert torch.equal(last.rows, before.rows), "collision detection changes no bit"
+    before = trained["+ written-out gradient"]
+    for name, idea in (("+ contacts off", "collision detection"), (CLOCK_OFF, "the profiling clock")):
+        assert torch.equal(trained[name].rows, before.rows), f"{idea} changes no bit"
 
 
 def test_the_floor_holds_every_matrix_product_of_an_iteration():

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from stable_baselines3.common.monitor import Monitor
 
-from reacher_shaping.evaluate import evaluate
+from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.policy import Policy, initialise, layers
 from reacher_shaping.streams import Purpose, stream
 
@@ -51,6 +51,7 @@ def monitored(policy, row, mode, episodes, *, clip=False):
                 "first_hit_step": hits[0] if hits else pd.NA,
                 "success": bool(hits),
                 "final_success": distances[-1] <= RADIUS,
+                "share_within_radius": len(hits) / 50,
             }
         )
     env.close()
@@ -60,7 +61,7 @@ def monitored(policy, row, mode, episodes, *, clip=False):
 @pytest.mark.parametrize("mode", ["stochastic", "deterministic"])
 @pytest.mark.parametrize("clip", [False, True], ids=["raw", "clipped"])
 def test_episodes_are_those_of_gymnasium_under_monitor(policy, mode, clip):
-    """Monitor rounds returns to six digits; actions of one lane and of twenty differ in the last digit of float32."""
+    """Monitor rounds returns to six digits; actions of one lane and of fifty differ in the last digit of float32."""
     ours = evaluate(policy.act, [10, 11], mode=mode, episodes=25, clip_actions=clip, **SETTINGS)
     assert ours["seed"].tolist() == [10] * 25 + [11] * 25
     assert ours["episode"].tolist() == [*range(25)] * 2
@@ -71,7 +72,7 @@ def test_episodes_are_those_of_gymnasium_under_monitor(policy, mode, clip):
         found = ours[ours["seed"] == seed].reset_index(drop=True)
         for name in ("episode_return", "reward_distance", "reward_control", "min_distance", "final_distance"):
             np.testing.assert_allclose(found[name], expected[name], rtol=1e-4, atol=1e-5, err_msg=name)
-        for name in ("success", "final_success"):
+        for name in ("success", "final_success", "share_within_radius"):
             assert found[name].tolist() == expected[name].tolist()
         assert found["first_hit_step"].fillna(0).tolist() == expected["first_hit_step"].fillna(0).tolist()
     assert 0 < ours["success"].sum() < len(ours)
@@ -80,8 +81,8 @@ def test_episodes_are_those_of_gymnasium_under_monitor(policy, mode, clip):
 
 def test_fewer_episodes_are_the_first_of_more(policy):
     """Whole and broken chunks of lanes alike."""
-    long = evaluate(policy.act, [0, 1], mode="stochastic", episodes=45, **SETTINGS)
-    for episodes in (1, 20, 33):
+    long = evaluate(policy.act, [0, 1], mode="stochastic", episodes=110, **SETTINGS)
+    for episodes in (1, 50, 73):
         short = evaluate(policy.act, [0, 1], mode="stochastic", episodes=episodes, **SETTINGS)
         expected = long[long["episode"] < episodes].reset_index(drop=True)
         pd.testing.assert_frame_equal(short, expected, check_exact=True)
@@ -103,7 +104,7 @@ def test_all_policies_and_modes_meet_the_same_resets_and_the_same_noise():
         return np.zeros((*observation.shape[:2], 2))
 
     for mode in ("stochastic", "deterministic"):
-        evaluate(spy, [4, 9], mode=mode, episodes=40, **SETTINGS)
+        evaluate(spy, [4, 9], mode=mode, episodes=2 * LANES_PER_SEED, **SETTINGS)
     stochastic, deterministic = seen[:100], seen[100:]
     assert all(noise is None for _, noise in deterministic)
     for t in (0, 50):

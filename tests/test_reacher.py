@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from reacher_shaping.reacher import EPISODE_STEPS, Lanes, control_cost, draw_reset, load_model
+from reacher_shaping.reacher import EPISODE_STEPS, Lanes, control_cost, draw_reset, load_model, profiling_clock
 
 LANES = 20
 
@@ -138,3 +138,13 @@ def test_control_cost_keeps_the_precision_of_the_action():
     cost = control_cost(action)
     assert cost.dtype == np.float32
     assert cost[0] == np.square(action[0]).sum()
+
+
+def test_lanes_switch_mujocos_profiling_clock_off():
+    clock = profiling_clock()
+    lanes = Lanes(1)
+    assert clock.value is None
+    lanes.reset([draw_reset(np.random.default_rng(0))])
+    lanes.step(np.zeros((1, 2)))
+    step = lanes.data[0].timer[mujoco.mjtTimer.mjTIMER_STEP]
+    assert (step.number, step.duration) == (2, 0), "both solver steps counted, neither timed"

@@ -155,7 +155,7 @@ def test_tables_have_the_columns_of_the_contract(project):
     episodes = pd.read_parquet(block / "episodes.parquet")
     assert list(episodes) == [
         *["seed", "mode", "episode", "episode_return", "reward_distance", "reward_control", "min_distance"],
-        *["final_distance", "first_hit_step", "success", "final_success"],
+        *["final_distance", "first_hit_step", "success", "final_success", "share_within_radius"],
     ]
     assert episodes.groupby("mode").size().to_dict() == {"deterministic": 20, "stochastic": 20}
     runs = pd.read_parquet(project.folder / "results/runs.parquet")

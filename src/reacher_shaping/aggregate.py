@@ -31,6 +31,7 @@ EVALUATION = [
     "reward_distance",
     "reward_control",
     "first_hit_step",
+    "share_within_radius",
 ]
 CURVE = ["peak_return", "peak_iteration", "final_return", "drop_from_peak", "roughness", "area_under_curve"]
 METRICS = EVALUATION + [f"deterministic_{name}" for name in EVALUATION] + CURVE + ["steps_to_threshold", "action_std"]
@@ -60,7 +61,7 @@ def evaluation_metrics(episodes: pd.DataFrame, mode: str) -> pd.DataFrame:
         "mean_return": groups["episode_return"].mean(),
         "final_success_rate": groups["final_success"].mean(),
     }
-    for name in ["final_distance", "min_distance", "reward_distance", "reward_control", "first_hit_step"]:
+    for name in EVALUATION[3:]:
         columns[name] = groups[name].mean()
     return pd.DataFrame(columns).astype(dict.fromkeys(EVALUATION, float))
 

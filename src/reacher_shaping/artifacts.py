@@ -98,6 +98,7 @@ EPISODES = Table(
         "first_hit_step": INTEGER,
         "success": FLAG,
         "final_success": FLAG,
+        "share_within_radius": NUMBER,
     },
     optional=frozenset({"first_hit_step", *_EPISODE_NUMBERS}),
 )

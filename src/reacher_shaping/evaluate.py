@@ -19,7 +19,7 @@ Mode = Literal["stochastic", "deterministic"]
 Actor = Callable[[Array, NDArray[np.float32] | None], NDArray[np.floating]]
 """(observations [S, L, 10], standard normal noise [S, L, 2] or None) -> torques [S, L, 2]."""
 
-LANES_PER_SEED = 20
+LANES_PER_SEED = 50
 """Episodes of one seed that run side by side; fixed, so that results never depend on a chunk's size."""
 
 
@@ -100,5 +100,6 @@ def _rows(distance: Array, control: Array, seeds: Sequence[int], mode: Mode, rad
             "first_hit_step": first,
             "success": success.ravel(),
             "final_success": hit[..., -1].ravel(),
+            "share_within_radius": hit.mean(-1).ravel(),
         }
     )

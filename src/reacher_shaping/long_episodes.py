@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from reacher_shaping.evaluate import Actor, Mode, evaluate
 from reacher_shaping.reacher import EPISODE_STEPS
@@ -36,9 +34,8 @@ def evaluate_lengths(
     """
     rows = []
     for steps in lengths:
-        watched = _Watched(act, steps, radius)
         frame = evaluate(
-            watched,
+            act,
             seeds,
             mode=mode,
             episodes=episodes,
@@ -49,7 +46,6 @@ def evaluate_lengths(
             steps=steps,
         )
         grouped = frame.groupby("seed", sort=False)
-        after_last = grouped["final_success"].sum().to_numpy()
         rows.append(
             pd.DataFrame(
                 {
@@ -61,34 +57,8 @@ def evaluate_lengths(
                     "final_success_rate": grouped["final_success"].mean().to_numpy(),
                     "final_distance": grouped["final_distance"].mean().to_numpy(),
                     "return_per_step": grouped["episode_return"].mean().to_numpy() / steps,
-                    "share_within_radius": (watched.within(episodes) + after_last) / (episodes * steps),
+                    "share_within_radius": grouped["share_within_radius"].mean().to_numpy(),
                 }
             )
         )
     return pd.concat(rows, ignore_index=True).sort_values(["seed", "steps"], kind="stable", ignore_index=True)
-
-
-class _Watched:
-    """An actor that counts, per seed and episode, the steps that ended within the radius, but for the last one.
-
-    It sees the state before each step: of T steps the states after the first T - 1, and the reset's, left out here.
-    """
-
-    def __init__(self, act: Actor, steps: int, radius: float) -> None:
-        self._act, self._steps, self._radius = act, steps, radius
-        self._calls = 0
-        self._counts: list[NDArray[np.int64]] = []
-
-    def __call__(self, observation: NDArray[np.float64], noise: NDArray[np.float32] | None) -> NDArray[np.floating]:
-        """Act on observations [S, L, 10]."""
-        if self._calls % self._steps == 0:
-            self._counts.append(np.zeros(observation.shape[:2], dtype=np.int64))
-        else:
-            self._counts[-1] += np.linalg.norm(observation[..., 8:10], axis=-1) <= self._radius
-        self._calls += 1
-        return self._act(observation, noise)
-
-    def within(self, episodes: int) -> NDArray[np.int64]:
-        """Return the steps counted in the first `episodes` episodes of each seed [S]."""
-        counts: NDArray[np.int64] = np.concatenate(self._counts, axis=1)[:, :episodes].sum(axis=1)
-        return counts
