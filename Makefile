@@ -11,7 +11,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare verify reference test check bench peers clean
+.PHONY: help setup reproduce quick report compare archive verify reference test check bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -39,7 +39,8 @@ quick: $(READY) ## the same at toy scale, into build/quick/
 report: $(READY) ## figures, tables, notebooks and report again: of results/, or of the reference run where there are none
 ifneq ($(wildcard results/runs.parquet),)
 	@python workflow/unlock.py .
-	snakemake --allowed-rules $(FROM_TABLES) build_report --forcerun run_notebook build_report --quiet rules -- report/report.html
+	snakemake --allowed-rules $(FROM_TABLES) build_report build_crate --forcerun run_notebook build_report --quiet rules \
+		-- report/report.html ro-crate-metadata.json
 	@echo "The report: $(CURDIR)/report/report.html"
 else
 	@mkdir -p build/reference/results
@@ -52,7 +53,10 @@ endif
 compare: $(READY) ## the run in results/ against the reference run, cell by cell
 	@python workflow/compare_reference.py
 
-verify: $(READY) ## are the files in results/ those of their manifests? recomputes the checksums
+archive: $(READY) ## report, tables, figures, runs and manifests in one zip, ready for Zenodo
+	@python workflow/archive.py
+
+verify: $(READY) ## are the study's files as they were made? recomputes the checksums
 	@python workflow/verify.py
 
 reference: $(READY) ## make the run in results/ the reference run: report/reference/ and the README's headline
@@ -77,5 +81,5 @@ peers: $(READY) ## Stable-Baselines3 PPO, SAC and TD3 on the same task (hours), 
 	snakemake --quiet rules
 
 clean: ## removes results, figures, report and build; keeps .venv
-	rm -rf build report/report.html .snakemake
+	rm -rf build report/report.html ro-crate-metadata.json .snakemake
 	find results figures -mindepth 1 ! -name README.md -delete

@@ -19,6 +19,7 @@ configfile: str(HERE / "config.yaml")
 
 
 STUDY = or_stop(load_study, config)
+SETTINGS_HASH = settings_hash(STUDY)
 
 
 include: "workflow/rules/train.smk"
@@ -29,6 +30,7 @@ include: "workflow/rules/figures.smk"
 include: "workflow/rules/notebooks.smk"
 include: "workflow/rules/media.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/publish.smk"
 
 
 # Intermediate files are named here too: a changed job that failed has lost its outputs, and without them in the
@@ -45,3 +47,4 @@ rule all:
         MEDIA,
         "results/check.txt",
         "report/report.html",
+        CRATE,

@@ -71,11 +71,23 @@ def test_checkpoint_stays_until_the_result_is_saved(tmp_path):
     assert trained(folder, [])[1] == 0
 
 
-def test_damaged_checkpoint_is_named(tmp_path):
-    (tmp_path / "key").mkdir()
-    (tmp_path / "key/checkpoint.pt").write_bytes(b"PK")
-    with pytest.raises(artifacts.ArtifactError, match=r"checkpoint\.pt"):
-        trained(tmp_path / "key", [])
+def test_damaged_checkpoint_is_named(tmp_path, monkeypatch):
+    interrupted(tmp_path / "key", monkeypatch, 2)
+    checkpoint = tmp_path / "key/checkpoint.pt"
+    whole = checkpoint.read_bytes()
+    middle = len(whole) // 2
+    for damaged in (b"", b"PK", whole[:-1], whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]):
+        checkpoint.write_bytes(damaged)
+        with pytest.raises(artifacts.ArtifactError, match=r"key/checkpoint\.pt: is damaged.*; delete it and run"):
+            trained(tmp_path / "key", [])
+        assert checkpoint.read_bytes() == damaged, "what is there is left for its owner to judge"
+
+
+def test_checkpoint_of_another_training_is_refused(tmp_path, monkeypatch):
+    interrupted(tmp_path / "key", monkeypatch, 2)
+    (tmp_path / "key").rename(tmp_path / "other")
+    with pytest.raises(artifacts.ArtifactError, match=r"other/checkpoint\.pt: is the checkpoint of another training"):
+        trained(tmp_path / "other", [])
 
 
 def test_meter_tells_speed_and_time_left():

@@ -13,7 +13,7 @@ SCRIPT = Path(__file__).parents[1] / "workflow" / "verify.py"
 
 @pytest.fixture
 def block(tmp_path):
-    folder = tmp_path / "paper" / "l2" / "4096" / "alpha1" / "seeds0-1"
+    folder = tmp_path / "results" / "paper" / "l2" / "4096" / "alpha1" / "seeds0-1"
     artifacts.write_text(folder / "policy.pt", "weights")
     artifacts.write_text(folder / "monitor" / "0.monitor.csv", "r,l,t")
     names = ["policy.pt", "monitor/0.monitor.csv"]
@@ -23,8 +23,7 @@ def block(tmp_path):
 
 
 def verify(block):
-    results = block.parents[4]
-    done = subprocess.run([sys.executable, SCRIPT, results], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, SCRIPT, block.parents[5]], capture_output=True, text=True, check=False)
     assert done.stderr == ""
     return done.returncode, done.stdout.strip().splitlines()
 
@@ -32,7 +31,7 @@ def verify(block):
 def test_untouched_files_pass(block):
     code, said = verify(block)
     assert code == 0
-    assert said == [f"The files of 1 seed blocks in {block.parents[4]} are those of their manifests."]
+    assert said == [f"The files of 1 seed blocks in {block.parents[4]} are as they were made."]
 
 
 @pytest.mark.parametrize("name", ["policy.pt", "monitor/0.monitor.csv"])

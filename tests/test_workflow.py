@@ -1,21 +1,14 @@
 """The real Snakefile on a copy of the project: one study of toy size is run, then edits are judged by dry runs."""
 
-import os
-import re
-import shutil
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+import zipfile
 
 import pandas as pd
 import pytest
-import yaml
+from project import Project
+from rocrate.rocrate import ROCrate
 
 from reacher_shaping import artifacts
 
-ROOT = Path(__file__).parents[1]
 TINY = {
     "seeds": 2,
     "seeds_per_block": 1,
@@ -29,75 +22,16 @@ NONE, DECAY = "results/paper/none/2048/alpha1", "results/paper/decay200k_l2sq/20
 EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "check_results", "plot_figures"}
 
 
-class Project:
-    """A copy of the project in `folder`, with the toy study in its config.yaml."""
-
-    def __init__(self, folder: Path):
-        self.folder = folder
-        for name in ("Snakefile", "profiles", "workflow", "src", "report", "config.yaml"):
-            place, ignored = ROOT / name, shutil.ignore_patterns("__pycache__", "*.egg-info", "report.html")
-            copy = shutil.copytree if place.is_dir() else shutil.copy
-            copy(place, folder / name, **({"ignore": ignored} if place.is_dir() else {}))
-        config = yaml.safe_load((folder / "config.yaml").read_text()) | TINY
-        (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
-
-    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess:
-        environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, "-m", "snakemake", *arguments]
-        return subprocess.run(
-            command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False, timeout=3600
-        )
-
-    def run(self, *arguments: str) -> None:
-        done = self.snakemake(*arguments)
-        assert done.returncode == 0, done.stderr[-6000:]
-
-    def planned(self, *arguments: str) -> dict[str, list[str]]:
-        """Rules that a dry run would execute, each with the outputs of its jobs."""
-        done = self.snakemake("--dry-run", *arguments)
-        assert done.returncode == 0, done.stderr[-6000:]
-        jobs: dict[str, list[str]] = {}
-        for rule, outputs in re.findall(
-            r"^rule (\w+):\n(?:    input: .*\n)?    output: (.*)$", done.stdout, re.MULTILINE
-        ):
-            jobs.setdefault(rule, []).extend(outputs.split(", "))
-        return jobs
-
-    @contextmanager
-    def edited(self, name: str, old: str, new: str) -> Iterator[None]:
-        path = self.folder / name
-        text = path.read_text()
-        assert old in text, f"{name} has no {old!r}"
-        with self.replaced(name, text.replace(old, new, 1)):
-            yield
-
-    @contextmanager
-    def configured(self, **changes) -> Iterator[None]:
-        config = yaml.safe_load((self.folder / "config.yaml").read_text()) | changes
-        with self.replaced("config.yaml", yaml.safe_dump(config, sort_keys=False)):
-            yield
-
-    @contextmanager
-    def replaced(self, name: str, text: str) -> Iterator[None]:
-        path = self.folder / name
-        before = path.read_text()
-        path.write_text(text)
-        try:
-            yield
-        finally:
-            path.write_text(before)
-
-
 @pytest.fixture(scope="module")
 def empty(tmp_path_factory) -> Project:
     """The project before anything was run."""
-    return Project(tmp_path_factory.mktemp("empty"))
+    return Project(tmp_path_factory.mktemp("empty"), TINY)
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory) -> Project:
     """The project with its toy study run to the end."""
-    project = Project(tmp_path_factory.mktemp("study"))
+    project = Project(tmp_path_factory.mktemp("study"), TINY)
     project.run()
     return project
 
@@ -138,7 +72,7 @@ def test_whole_study_makes_every_file_of_the_contract(project):
     expected += [f"results/tables/table_{number}.{kind}" for number in (1, 2, 3) for kind in ("csv", "md")]
     expected += [f"figures/figure_{number}.{kind}" for number in (1, 2, 3, 4) for kind in ("svg", "pdf")]
     expected += [f"results/media/paper-none-2048-alpha1.{kind}" for kind in ("gif", "mp4")]
-    expected += ["results/notebooks/story.ipynb", "report/report.html"]
+    expected += ["results/notebooks/story.ipynb", "report/report.html", "ro-crate-metadata.json"]
     missing = [name for name in expected if not (project.folder / name).exists()]
     assert missing == []
 
@@ -176,6 +110,59 @@ def test_manifest_holds_the_checksums_of_the_block(project):
         assert manifest[key] is not None
     assert manifest["env_steps"] == 2048
     assert manifest["env_steps_per_second"] > 0
+
+
+def test_crate_lists_every_file_of_the_study_and_how_it_came_about(project):
+    crate = ROCrate(project.folder)
+    listed = {entity.id for entity in crate.get_by_type("File")}
+    made = {path for folder in ("results", "figures", "report") for path in (project.folder / folder).rglob("*")}
+    made = {str(path.relative_to(project.folder)) for path in made if path.is_file()}
+    shipped = {f"report/{part}" for part in ("claims.yaml", "report.html.j2")} | {
+        name for name in made if name.startswith(("report/published/", "report/reference/"))
+    }
+    kept_out = {name for name in made if name.startswith(("results/logs/", "results/benchmarks/", "results/."))}
+    assert listed == made - shipped - kept_out
+    assert crate.dereference("results/runs.parquet")["sha256"] == artifacts.sha256(
+        project.folder / "results/runs.parquet"
+    )
+    study = crate.dereference("#study")
+    assert study["startTime"] < study["endTime"]
+    assert {package["name"] for package in study["instrument"]} >= {"torch", "mujoco", "snakemake", "reacher-shaping"}
+    settings = artifacts.read_json(project.folder / study["object"][0].id)
+    assert settings["study"]["seeds"] == 2
+    assert settings["sha256"] in (project.folder / "report/report.html").read_text()
+
+
+def test_archive_packs_the_study_byte_for_byte(project, tmp_path):
+    for name in ("1.zip", "2.zip"):
+        done = project.python("workflow/archive.py", ".", str(tmp_path / name))
+        assert done.returncode == 0, done.stderr
+    assert artifacts.sha256(tmp_path / "1.zip") == artifacts.sha256(tmp_path / "2.zip")
+    with zipfile.ZipFile(tmp_path / "1.zip") as packed:
+        packed.extractall(tmp_path / "out")
+    for name in ("report/report.html", f"{NONE}/seeds0-0/manifest.json", "figures/figure_1.svg"):
+        assert (tmp_path / "out" / name).read_bytes() == (project.folder / name).read_bytes()
+    done = project.python("workflow/verify.py", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    listed = len(ROCrate(project.folder).get_by_type("File"))
+    assert done.stdout.strip().endswith(f"and all {listed} of the study's crate.")
+
+
+@pytest.mark.parametrize("name", ["results/claims.csv", "figures/figure_2.svg", f"{NONE}/seeds0-0/episodes.parquet"])
+def test_changed_file_is_named_and_never_archived(project, tmp_path, name):
+    path = project.folder / name
+    content = path.read_bytes()
+    path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    try:
+        done = project.python("workflow/verify.py")
+        assert done.returncode == 1
+        assert done.stdout == f"{name}: has changed since it was made; delete it and run snakemake again\n"
+        done = project.python("workflow/archive.py", ".", str(tmp_path / "study.zip"))
+        assert done.returncode == 1
+        assert name in done.stderr
+        assert not (tmp_path / "study.zip").exists()
+    finally:
+        path.write_bytes(content)
 
 
 def test_finished_study_has_nothing_to_do(project):

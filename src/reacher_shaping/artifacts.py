@@ -36,7 +36,7 @@ class ArtifactError(RuntimeError):
     """A file is missing, damaged or not what its name says; the message names it and how to repair it."""
 
     def __init__(self, path: Path | str, problem: str, repair: str = "delete it and run snakemake again"):
-        super().__init__(f"{path}: {problem}; {repair}")
+        super().__init__(f"{path}: {' '.join(problem.split())}; {repair}")
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def write_table(path: Path | str, frame: pd.DataFrame, table: Table) -> None:
         write_text(path, arrow.to_pandas(types_mapper=_nullable).to_csv(index=False, lineterminator="\n"))
         return
     with replacing(path) as temporary:
-        pq.write_table(arrow, temporary, compression="zstd")
+        pq.write_table(arrow, temporary, compression="zstd", write_page_checksum=True)
 
 
 def read_table(path: Path | str, table: Table) -> pd.DataFrame:
@@ -229,7 +229,7 @@ def read_table(path: Path | str, table: Table) -> pd.DataFrame:
             frame = pd.read_csv(path, keep_default_na=False, na_values=[""])
             arrow = _to_arrow(frame, table, path)
         else:
-            arrow = pq.read_table(path)
+            arrow = pq.read_table(path, page_checksum_verification=True)
             if not arrow.schema.equals(table.schema(arrow.column_names)):
                 raise ValueError("a column has another type")
         content: pd.DataFrame = arrow.to_pandas()
@@ -237,7 +237,7 @@ def read_table(path: Path | str, table: Table) -> pd.DataFrame:
     except OSError as error:
         raise ArtifactError(path, f"cannot be read ({error.strerror or error})") from None
     except (ValueError, pa.ArrowException) as error:
-        raise ArtifactError(path, f"is not the expected table ({' '.join(str(error).split())})") from None
+        raise ArtifactError(path, f"is not the expected table ({error})") from None
 
 
 def write_policy(
@@ -281,23 +281,40 @@ def read_policy(path: Path | str) -> PolicyFile:
         raise ArtifactError(path, f"is no policy file of this project ({error!r})") from None
 
 
-def load_tensors(path: Path | str) -> dict[str, Any]:
+def write_sealed(path: Path | str, content: bytes) -> None:
+    """Write a file that tells whether it is as it was written: its checksum (SHA-256, 32 bytes) comes first."""
+    write_bytes(path, hashlib.sha256(content).digest() + content)
+
+
+def read_sealed(path: Path | str) -> bytes:
+    """Return the content of a file of `write_sealed`. Raises ArtifactError."""
+    try:
+        stored = Path(path).read_bytes()
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror})") from None
+    if hashlib.sha256(stored[32:]).digest() != stored[:32]:
+        raise ArtifactError(path, "is damaged: its checksum does not fit")
+    return stored[32:]
+
+
+def load_tensors(path: Path | str, content: bytes | None = None) -> dict[str, Any]:
     """Load a dict saved by torch, tensors and plain values only: a file with pickled code is refused.
 
-    Raises ArtifactError.
+    `content` is the file's, where it has been read already. Raises ArtifactError.
     """
     import torch
 
+    source = path if content is None else io.BytesIO(content)
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        tensors = torch.load(source, map_location="cpu", weights_only=True)
     except FileNotFoundError:
         raise ArtifactError(path, "does not exist", "check the path") from None
     except Exception as error:  # torch raises whatever its unpickler and zip reader meet in a damaged file
         problem = type(error).__name__  # its text would advise to load the file in a way that executes code
         raise ArtifactError(path, f"is no file of plain tensors ({problem})", "nothing in it was executed") from None
-    if not isinstance(content, dict):
+    if not isinstance(tensors, dict):
         raise ArtifactError(path, "holds no dict of tensors", "nothing in it was executed")
-    return content
+    return tensors
 
 
 def write_monitors(folder: Path | str, episodes: pd.DataFrame) -> None:

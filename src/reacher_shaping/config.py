@@ -299,7 +299,7 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
     try:
         return Study.model_validate(dict(content))
     except ValidationError as error:
-        raise ConfigError(f"{name}: {_one_line(error)}") from None
+        raise ConfigError(f"{name}: {_flat(_one_line(error))}") from None
 
 
 def require_mapping(path: Path | str) -> Mapping[str, Any]:

@@ -64,8 +64,9 @@ def trained_block(
 
 
 def save_checkpoint(path: Path, state: TrainState) -> None:
-    """Write all that training needs to go on, as plain tensors."""
+    """Write all that training needs to go on, as plain tensors; the folder's name tells which training it is of."""
     content = {
+        "training": path.parent.name,
         "seeds": list(state.seeds),
         "iteration": state.iteration,
         "rows": state.rows,
@@ -76,12 +77,14 @@ def save_checkpoint(path: Path, state: TrainState) -> None:
     }
     buffer = io.BytesIO()
     torch.save(content, buffer)
-    artifacts.write_bytes(path, buffer.getvalue())
+    artifacts.write_sealed(path, buffer.getvalue())
 
 
 def load_checkpoint(path: Path) -> TrainState:
-    """Read a checkpoint. Raises ArtifactError."""
-    content = artifacts.load_tensors(path)
+    """Read a checkpoint of this training. Raises ArtifactError if it is damaged or of another one."""
+    content = artifacts.load_tensors(path, artifacts.read_sealed(path))
+    if content.get("training") != path.parent.name:
+        raise artifacts.ArtifactError(path, "is the checkpoint of another training")
     try:
         return TrainState(
             seeds=tuple(content["seeds"]),

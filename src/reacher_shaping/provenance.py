@@ -15,6 +15,7 @@ import subprocess
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -96,10 +97,26 @@ def machine() -> dict[str, Any]:
     return {"cpu": _cpu(), "cores": len(os.sched_getaffinity(0)), "system": f"{platform.system()} {platform.release()}"}
 
 
+def unchanged(path: Path | str) -> Path:
+    """Return the path of a block's file if its content is what its job wrote, by the checksum beside it.
+
+    Raises ArtifactError that names the file that has changed, or the manifest that cannot tell.
+    """
+    path = Path(path)
+    for manifest in (path.parent / "training.json", path.parent / "manifest.json"):
+        outputs = artifacts.read_json(manifest).get("outputs")
+        if isinstance(outputs, Mapping) and path.name in outputs:
+            if artifacts.sha256(path) != outputs[path.name]:
+                raise artifacts.ArtifactError(path, f"is not the file that {manifest} has the checksum of")
+            return path
+    raise artifacts.ArtifactError(manifest, f"has no checksum of {path.name}")
+
+
 @dataclass
 class Record:
     """What a job was: started when the object is made, told by `to_dict` at its end."""
 
+    started: datetime = field(default_factory=lambda: datetime.now(UTC))
     wall: float = field(default_factory=time.perf_counter)
     cpu: float = field(default_factory=time.process_time)
 
@@ -118,6 +135,8 @@ class Record:
             "git": git_state(Path(__file__).parent),
             "machine": machine(),
             "threads": threads,
+            "started": self.started.isoformat(timespec="seconds"),
+            "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "wall_seconds": round(wall, 3),
             "cpu_seconds": round(time.process_time() - self.cpu, 3),
             "env_steps": env_steps,

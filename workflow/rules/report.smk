@@ -1,7 +1,4 @@
 # From everything to one HTML file.
-import hashlib
-
-
 # Every file of the blocks but the Monitor folders: a folder has no checksum, so one made again with the same bytes would
 # count as changed. The job that makes it also makes the policy.
 rule build_report:
@@ -15,6 +12,11 @@ rule build_report:
         correlation="results/correlation.csv",
         claims="results/claims.csv",
         controllers="results/controllers.parquet",
+        power="results/power.parquet",
+        variance="results/variance.parquet",
+        winners="results/winners.csv",
+        spread="results/spread.csv",
+        peers=PEERS,
         ledger=source("report/claims.yaml"),
         figures=FIGURES + FURTHER_FIGURES,
         media=MEDIA,
@@ -30,7 +32,7 @@ rule build_report:
     threads: 1
     params:
         study=as_json(STUDY.model_dump(mode="json")),
-        settings_hash=hashlib.sha256(as_json(STUDY.model_dump(mode="json")).encode()).hexdigest(),
+        settings_hash=SETTINGS_HASH,
         code=code("build_report"),
     script:
         "../scripts/build_report.py"
@@ -48,6 +50,11 @@ use rule build_report as build_reference_report with:
         correlation="results/correlation.csv",
         claims="results/claims.csv",
         controllers="results/controllers.parquet",
+        power="results/power.parquet",
+        variance="results/variance.parquet",
+        winners="results/winners.csv",
+        spread="results/spread.csv",
+        peers=PEERS,
         ledger=source("report/claims.yaml"),
         figures=FIGURES + FURTHER_FIGURES,
         media=[],

@@ -4,13 +4,18 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping import aggregate, artifacts, curves
+from reacher_shaping.provenance import unchanged
 
 params, output = snakemake.params, snakemake.output
 files = list(zip(params.cells, snakemake.input.progress, snakemake.input.episodes, strict=True))
 
 with logged(snakemake.log[0]):
     blocks = (
-        (cell, artifacts.read_table(progress, artifacts.PROGRESS), artifacts.read_table(episodes, artifacts.EPISODES))
+        (
+            cell,
+            artifacts.read_table(unchanged(progress), artifacts.PROGRESS),
+            artifacts.read_table(unchanged(episodes), artifacts.EPISODES),
+        )
         for cell, progress, episodes in files
     )
     runs = aggregate.runs_frame(blocks)

@@ -11,7 +11,7 @@ from reacher_shaping import artifacts
 from reacher_shaping.config import Environment, Evaluation
 from reacher_shaping.evaluate import evaluate
 from reacher_shaping.policy import Policy
-from reacher_shaping.provenance import Record, merged_manifest
+from reacher_shaping.provenance import Record, merged_manifest, unchanged
 
 record = Record()
 params, block = snakemake.params, Path(snakemake.output.episodes).parent
@@ -20,7 +20,7 @@ environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    trained = artifacts.read_policy(snakemake.input.policy)
+    trained = artifacts.read_policy(unchanged(snakemake.input.policy))
     policy = Policy.from_weights(trained.weights)
     frames = [
         evaluate(

@@ -7,13 +7,14 @@ from reacher_shaping import artifacts
 from reacher_shaping.config import Environment, Evaluation
 from reacher_shaping.long_episodes import evaluate_lengths
 from reacher_shaping.policy import Policy
+from reacher_shaping.provenance import unchanged
 
 params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    trained = artifacts.read_policy(snakemake.input.policy)
+    trained = artifacts.read_policy(unchanged(snakemake.input.policy))
     long = evaluate_lengths(
         Policy.from_weights(trained.weights).act,
         trained.seeds,

@@ -6,13 +6,14 @@ from job import logged
 from reacher_shaping import artifacts, media
 from reacher_shaping.config import Environment
 from reacher_shaping.policy import Policy
+from reacher_shaping.provenance import unchanged
 
 params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    trained = artifacts.read_policy(snakemake.input[0])
+    trained = artifacts.read_policy(unchanged(snakemake.input[0]))
     first = Policy.from_weights({name: tensor[:1] for name, tensor in trained.weights.items()})
     episode = media.evaluation_episode(
         first.act,

@@ -4,12 +4,13 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping import aggregate, artifacts
+from reacher_shaping.provenance import unchanged
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
     episodes = (
-        (cell, artifacts.read_table(path, artifacts.EPISODES))
+        (cell, artifacts.read_table(unchanged(path), artifacts.EPISODES))
         for cell, path in zip(params.cells, given.episodes, strict=True)
     )
     radii = aggregate.radius_cells(aggregate.radius_frame(episodes), params.root_seed)

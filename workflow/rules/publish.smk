@@ -1,0 +1,35 @@
+# From all files of the study to one research object that lists them; `make archive` packs what it lists.
+CRATE = "ro-crate-metadata.json"
+
+
+rule build_crate:
+    input:
+        files=[
+            BLOCK_FILES,
+            expand("{block}/{file}", block=BLOCKS, file=["training.json", "long_episodes.parquet"]),
+            TABLES,
+            FIGURES,
+            FURTHER_FIGURES,
+            FORMATTED_TABLES,
+            NOTEBOOKS,
+            MEDIA,
+            "results/check.txt",
+            "report/report.html",
+        ],
+        manifests=expand("{block}/manifest.json", block=BLOCKS),
+    output:
+        crate=CRATE,
+        settings="results/settings.json",
+    log:
+        "results/logs/build_crate.log",
+    benchmark:
+        "results/benchmarks/build_crate.tsv"
+    threads: 1
+    params:
+        study=as_json(STUDY.model_dump(mode="json")),
+        settings_hash=SETTINGS_HASH,
+        cells=len(STUDY.cells),
+        seeds=STUDY.seeds,
+        code=code("build_crate"),
+    script:
+        "../scripts/build_crate.py"

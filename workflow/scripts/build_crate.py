@@ -1,0 +1,30 @@
+"""Write the study's settings, and the crate that lists all its files with their checksums."""
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from job import logged
+
+from reacher_shaping import artifacts, crate
+
+given, params, output = snakemake.input, snakemake.params, snakemake.output
+
+
+def files(paths: Iterable[str]) -> Iterator[Path]:
+    """The files among paths and in the folders among them."""
+    for path in map(Path, paths):
+        yield from (part for part in path.rglob("*") if part.is_file()) if path.is_dir() else [path]
+
+
+with logged(snakemake.log[0]):
+    artifacts.write_json(output.settings, {"study": json.loads(params.study), "sha256": params.settings_hash})
+    settings = Path(output.settings)
+    found = crate.describe(
+        [*set(files(given.files)), settings],
+        settings=settings,
+        manifests=[artifacts.read_json(path) for path in given.manifests],
+        name="Reward shaping for PPO on Reacher-v5",
+        description=f"A run of the reacher-shaping study with {params.cells} cells of {params.seeds} seeds.",
+    )
+    artifacts.write_json(output.crate, found)
