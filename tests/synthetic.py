@@ -22,6 +22,7 @@ MEASURES = (
     "success_rate", "mean_return", "final_success_rate", "final_distance", "min_distance",
     "reward_distance", "reward_control", "first_hit_step", "share_within_radius",
 )  # fmt: skip
+CURVE = ("peak_return", "final_return", "drop_from_peak", "roughness", "area_under_curve", "steps_to_threshold")
 
 
 def runs(grid, seeds=10):
@@ -39,20 +40,62 @@ def runs(grid, seeds=10):
             row |= {"share_within_radius": success / 10}
             row |= {f"deterministic_{name}": row[name] for name in MEASURES}
             row |= {"peak_return": -9.0, "peak_iteration": 200, "final_return": -10.0, "diverged": False}
+            row |= {"drop_from_peak": 1.0 + success, "roughness": success / 5, "area_under_curve": -12.0 + success}
+            row |= {"steps_to_threshold": 2048.0 * (50 + seed)}
             rows.append(row)
     return pd.DataFrame(rows)
 
 
 def cells(grid, seeds=10):
     """A row per cell, as `cells.parquet` has it."""
+    return summary(runs(grid, seeds))
+
+
+def summary(table):
+    """The cells of a table of runs."""
+    names = [*MEASURES, *[f"deterministic_{name}" for name in MEASURES], *CURVE]
     rows = []
-    for key, part in runs(grid, seeds).groupby(CELL, sort=False):
-        row = dict(zip(CELL, key, strict=True), seeds=seeds, diverged=0, interval="95 % bootstrap over seeds")
-        for name in MEASURES:
-            mean, spread = part[name].mean(), 2 * part[name].std(ddof=0) / np.sqrt(seeds)
-            row |= {name: mean, f"{name}_iqm": mean, f"{name}_low": mean - spread, f"{name}_high": mean + spread}
-        rows.append(row)
+    for key, part in table.groupby(CELL, sort=False):
+        row = dict(zip(CELL, key, strict=True), seeds=len(part), diverged=int(part["diverged"].sum()))
+        row["interval"] = "95 % bootstrap over seeds"
+        columns = {}
+        for name in names:
+            mean, spread = part[name].mean(), 2 * part[name].std(ddof=0) / np.sqrt(len(part))
+            columns |= {name: mean, f"{name}_iqm": mean, f"{name}_low": mean - spread, f"{name}_high": mean + spread}
+        rows.append(row | columns)
     return pd.DataFrame(rows)
+
+
+def diverge(table, variant="l2", seed=1):
+    """The runs with those of one variant and seed diverged: no return and no curve measures, no success either."""
+    table = table.copy()
+    lost = (table["variant"] == variant) & (table["seed"] == seed)
+    numbers = ["mean_return", "final_distance", "reward_distance", "reward_control", "first_hit_step", *CURVE]
+    table.loc[lost, numbers] = np.nan
+    table.loc[lost, ["success_rate", "final_success_rate"]] = 0.0
+    table.loc[lost, "diverged"] = True
+    return table
+
+
+def peers(seeds=3):
+    """A row per run of another algorithm, as `peers.parquet` has it."""
+    budgets = {"td3": 100_000, "ppo": 500_000, "sac": 100_000}
+    rows = []
+    for number, (name, budget) in enumerate(budgets.items()):
+        for seed in range(seeds):
+            row = {"algorithm": name, "seed": seed, "budget": budget}
+            values = dict.fromkeys(MEASURES, 0.1 * (number + 1) + 0.01 * seed)
+            values |= {"success_rate": 0.3 * number + 0.1 * seed, "mean_return": -3.0 - number - seed}
+            rows.append(row | values | {f"deterministic_{measure}": value for measure, value in values.items()})
+    return pd.DataFrame(rows)
+
+
+def over(grid, seeds, column, values):
+    """The cells repeated over the values of a further column, in one mode: radii or episode lengths."""
+    parts = [cells(grid, seeds).assign(**{column: value}, mode="stochastic") for value in values]
+    names = [name for name in MEASURES if name.startswith(("success", "final"))]
+    columns = [f"{name}{end}" for name in names for end in ("", "_iqm", "_low", "_high")]
+    return pd.concat(parts, ignore_index=True)[[*CELL, "mode", column, "seeds", *columns]]
 
 
 def progress(grid, seeds=10):

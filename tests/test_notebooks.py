@@ -7,11 +7,12 @@ from pathlib import Path
 
 import jupytext
 import nbformat
+import numpy as np
 import papermill
 import pytest
 import synthetic
 
-from reacher_shaping import artifacts, curves, notebooks
+from reacher_shaping import artifacts, comparisons, curves, lottery, notebooks
 
 SOURCES = sorted((Path(__file__).parents[1] / "workflow" / "notebooks").glob("*.py"))
 IDS = [path.stem for path in SOURCES]
@@ -33,6 +34,18 @@ def study(tmp_path_factory):
     published = synthetic.correlation().assign(protocol="published")
     artifacts.write_table(results / "correlation_published.csv", published, artifacts.CORRELATION)
     artifacts.write_table(results / "claims.csv", synthetic.claims(), artifacts.CLAIMS)
+    runs = synthetic.runs(grid, 2)
+    artifacts.write_table(results / "comparisons.parquet", comparisons.comparison_frame(runs, 0), artifacts.COMPARISONS)
+    artifacts.write_table(results / "variance.parquet", comparisons.variance_frame(runs), artifacts.VARIANCE)
+    power = comparisons.power_frame(runs, synthetic.published())
+    artifacts.write_table(results / "power.parquet", power, artifacts.POWER)
+    studies = lottery.single_seed_studies(runs, np.random.default_rng(0), 10)
+    artifacts.write_table(results / "lottery.csv", lottery.lottery_frame(studies), artifacts.LOTTERY)
+    artifacts.write_table(results / "winners.csv", lottery.winners_frame(studies), artifacts.WINNERS)
+    artifacts.write_table(results / "spread.csv", lottery.spread_frame(studies), artifacts.SPREAD)
+    radii, lengths = (synthetic.over(grid, 2, *more) for more in (("radius", (0.01, 0.02)), ("steps", (50, 100))))
+    artifacts.write_table(results / "radii.parquet", radii, artifacts.RADII)
+    artifacts.write_table(results / "lengths.parquet", lengths, artifacts.LENGTHS)
     (folder / "published").mkdir()
     for name in ("table2.csv", "table3.csv"):
         (folder / "published" / name).write_bytes((synthetic.PUBLISHED / name).read_bytes())
@@ -54,10 +67,11 @@ def test_sources_define_nothing_and_say_their_language(source):
     assert [cell for cell in notebook.cells if "parameters" in cell.metadata.get("tags", [])]
 
 
-def test_a_notebook_run_twice_gives_the_same_bytes(study, monkeypatch):
+@pytest.mark.parametrize(("name", "figures"), [("correlation", 1), ("further_views", 5)])
+def test_a_notebook_run_twice_gives_the_same_bytes(study, monkeypatch, name, figures):
     monkeypatch.chdir(study)
     parameters = {"results": "results", "published": "published"}
-    source = next(path for path in SOURCES if path.stem == "correlation")
+    source = next(path for path in SOURCES if path.stem == name)
     outs = [Path("out") / f"{number}.ipynb" for number in (1, 2)]
     for out in outs:
         notebooks.execute(source, out, parameters)
@@ -68,7 +82,7 @@ def test_a_notebook_run_twice_gives_the_same_bytes(study, monkeypatch):
     notebook = nbformat.reads(text, as_version=4)
     nbformat.validate(notebook)
     shown = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
-    assert len([output for output in shown if "image/svg+xml" in output.get("data", {})]) == 1
+    assert len([output for output in shown if "image/svg+xml" in output.get("data", {})]) == figures
     assert not [output for output in shown if output.output_type in ("error", "stream")]
 
 

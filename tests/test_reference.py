@@ -1,11 +1,13 @@
 """The reference run in the repository, what the README says of it, and the comparison with another run."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+import synthetic
 
 from reacher_shaping import artifacts, bars, reference, style, tables
 
@@ -56,6 +58,33 @@ def test_reference_cells_are_the_means_of_its_runs():
     assert np.allclose(means, kept.loc[means.index], rtol=0, atol=1e-12)
     assert len(cells) == 23
     assert (cells["seeds"] == runs.groupby(["variant", "budget", "alpha0"]).size().iloc[0]).all()
+
+
+@needs_reference
+def test_tables_kept_are_those_of_the_run(tmp_path):
+    reference.keep_tables(KEPT, tmp_path)
+    for name in reference.TABLES:
+        assert (tmp_path / name).exists(), name
+    assert read("cells.parquet").equals(artifacts.read_table(tmp_path / "cells.parquet", artifacts.CELLS))
+
+
+@needs_reference
+def test_peers_are_kept_where_the_run_has_them_and_go_where_it_has_none(tmp_path):
+    results, kept = tmp_path / "results", tmp_path / "kept"
+    shutil.copytree(KEPT, results)
+    (results / "peers.parquet").unlink(missing_ok=True)
+    artifacts.write_table(results / "peers.parquet", synthetic.peers(), artifacts.PEERS)
+    reference.keep_tables(results, kept)
+    assert artifacts.read_table(kept / "peers.parquet", artifacts.PEERS).equals(synthetic.peers())
+    (results / "peers.parquet").unlink()
+    reference.keep_tables(results, kept)
+    assert not (kept / "peers.parquet").exists()
+    assert (kept / "runs.parquet").exists()
+
+
+def test_run_that_lacks_a_table_cannot_be_the_reference(tmp_path):
+    with pytest.raises(artifacts.ArtifactError, match=r"runs\.parquet"):
+        reference.keep_tables(tmp_path, tmp_path / "kept")
 
 
 def test_a_run_agrees_with_itself_and_with_other_seeds_of_the_same_kind():

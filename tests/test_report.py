@@ -11,7 +11,19 @@ import pytest
 import synthetic
 from matplotlib.figure import Figure
 
-from reacher_shaping import answers, captions, config, plots, report, tables
+from reacher_shaping import (
+    aggregate,
+    answers,
+    captions,
+    comparisons,
+    config,
+    learning,
+    lottery,
+    peer_results,
+    plots,
+    report,
+    tables,
+)
 
 ROOT = Path(__file__).parents[1]
 LOADING = ("img", "script", "link", "iframe", "video", "source", "object", "embed", "audio")
@@ -73,17 +85,23 @@ def study():
 
 def _inputs(folder, study, grid, seeds, **changes):
     cells = synthetic.cells(grid, seeds)
-    figures = {"figure_1": Figure(figsize=(2, 1)), "figure_2": Figure(figsize=(1, 2))}
+    sizes = {"figure_1": (2, 1), "figure_2": (1, 2), "lottery": (1, 1), "forest": (2, 2), "peers": (3, 1)}
+    figures = {name: Figure(figsize=size) for name, size in sizes.items()}
     paths = {name: plots.save(figure, folder / "figures" / name, ("svg", "pdf"))[0] for name, figure in figures.items()}
     (folder / "media").mkdir()
     for key in grid:
         for kind in ("gif", "mp4"):
             name = f"{key[0]}-{key[1]}-{key[2]}-alpha{key[3]:g}.{kind}"
             (folder / "media" / name).write_bytes(kind.encode() + bytes(range(200)))
+    runs = synthetic.runs(grid, seeds)
+    studies = lottery.single_seed_studies(runs, np.random.default_rng(0), 50)
     given = {
-        "study": study, "cells": cells, "runs": synthetic.runs(grid, seeds), "published": synthetic.published(),
+        "study": study, "cells": cells, "runs": runs, "published": synthetic.published(),
         "correlation": synthetic.correlation(), "claims": synthetic.claims(), "controllers": synthetic.controllers(),
-        "figures": paths, "media": sorted((folder / "media").iterdir()), "manifests": [MANIFEST] * 3,
+        "power": comparisons.power_frame(runs, synthetic.published()), "variance": comparisons.variance_frame(runs),
+        "winners": lottery.winners_frame(studies), "spread": lottery.spread_frame(studies),
+        "peers": synthetic.peers(), "figures": paths,
+        "media": sorted((folder / "media").iterdir()), "manifests": [MANIFEST] * 3,
         "notebooks": [folder / "results" / "notebooks" / "story.ipynb"], "settings_hash": "ab" * 32,
         "ledger": [{"id": "C1", "evidence": "thirteen of fifteen", "shown_in": ["figure_2", "figure_9"]}],
         "folder": folder / "report", "template": ROOT / "report" / "report.html.j2",
@@ -116,6 +134,8 @@ def test_same_inputs_give_the_same_report(inputs):
 def test_figures_are_the_given_files(page, inputs):
     encoded = [source.split(",")[1] for source in page.loaded if source.startswith("data:image/svg")]
     assert [base64.b64decode(text) for text in encoded] == [path.read_bytes() for path in inputs.figures.values()]
+    assert page.ids.index("seeds") < page.ids.index("lottery") < page.ids.index("further") < page.ids.index("forest")
+    assert page.ids.index("forest") < page.ids.index("peers") < page.ids.index("claims")
 
 
 def test_every_cell_has_its_video_and_mp4_goes_before_gif(page):
@@ -145,6 +165,50 @@ def test_tables_hold_the_values_of_the_cells(page, inputs):
     for name, make in (("table_2", tables.table_2), ("table_3", tables.table_3)):
         for row in tables.readable(make(inputs.cells, inputs.published)).to_numpy().tolist():
             assert [entry.replace(" [", "[") for entry in row] in page.rows, name
+
+
+def test_measures_power_variance_and_lottery_are_shown(page, inputs):
+    for name, make in (
+        ("behaviour", tables.behaviour(inputs.cells)),
+        ("learning", tables.learning(inputs.cells, inputs.runs)),
+    ):
+        for row in tables.readable(make).to_numpy().tolist():
+            assert [entry.replace(" [", "[") for entry in row] in page.rows, name
+    gain = inputs.power["published_gain"].max()  # of l2 and of decay300k
+    assert [row for row in page.rows if row[0] == "decay 300K" and row[3] == f"{gain:.3f}"]
+    assert "seeds of this study would have a power of" in page.text
+    assert "of the variance of the success rate over runs is between seeds" in page.text
+    assert [row[0] for row in page.rows if row[0].startswith("Success rate of")] == ["Success rate of the best cell"]
+    assert f"{len(inputs.winners)} cells could have come out best" in page.text
+
+
+def test_share_within_radius_may_be_missing(inputs):
+    older = inputs.cells.drop(columns=[name for name in inputs.cells if "share_within_radius" in name])
+    page = Page(report.build(_changed(inputs, cells=older)))
+    assert "Share of steps within the radius" not in [entry for row in page.rows for entry in row]
+    assert "Step of the first hit" in [entry for row in page.rows for entry in row]
+
+
+def test_peers_stand_beside_none_and_their_budgets_are_said(page, inputs):
+    table = peer_results.peer_table(inputs.peers, inputs.cells, inputs.controllers)
+    for row in tables.readable(table).to_numpy().tolist():
+        assert [entry.replace(" [", "[") for entry in row] in page.rows
+    assert "PPO 500K (3 seeds), SAC 100K (3 seeds), TD3 100K (3 seeds)" in page.text
+    without = _changed(inputs, peers=None, figures={name: p for name, p in inputs.figures.items() if name != "peers"})
+    text = Page(report.build(without)).text
+    assert "No other algorithms have been trained" in text
+    assert "TD3 100K" not in text
+
+
+def test_diverged_runs_are_counted_everywhere(inputs):
+    runs = synthetic.diverge(inputs.runs, "l2", 1)
+    page = Page(report.build(_changed(inputs, runs=runs, cells=synthetic.summary(runs))))
+    assert "69 training runs, of which 3 diverged" in page.text
+    assert next(row for row in page.rows if row[0] == "L2")[1] == "3 (1 diverged)"
+    assert "3 of these 51 runs diverged: past its last finite return" in page.text  # the main grid's curves
+    assert "3 of these 69 runs diverged (see Seeds)" in page.text
+    assert page.text.count("3 (1 diverged)") >= 12
+    assert "nan" not in page.text
 
 
 def test_setup_is_read_from_the_configuration(page, study, inputs):
@@ -191,11 +255,13 @@ def test_toy_study_without_the_rest_says_what_is_missing(tmp_path, study):
     bare = _inputs(
         tmp_path, study, synthetic.TOY_GRID, 2,
         correlation=None, claims=None, controllers=None, figures={}, media=[], manifests=[], notebooks=[], ledger=[],
+        power=None, variance=None, winners=None, spread=None, peers=None,
     )  # fmt: skip
     text = Page(report.build(bare)).text
     for words in (
         "This figure has not been drawn.", "claims have not been tested", "No rollouts have been rendered.",
-        "No manifests were given.", "No such cells in this study.",
+        "No manifests were given.", "No such cells in this study.", "How many seeds it takes has not been computed.",
+        "The variance has not been split.", "No other algorithms have been trained",
     ):  # fmt: skip
         assert words in text
 
@@ -247,6 +313,22 @@ def test_short_answers_follow_the_verdicts(verdicts, short):
 def test_effects_have_about_three_digits_and_no_exponent():
     values = [answers.short_number(value) for value in (0.01234, 1.234, 12.34, 123456.7, np.nan)]
     assert values == ["0.012", "1.23", "12.3", "123457", "\N{EN DASH}"]
+
+
+def test_captions_count_diverged_runs_of_their_own_groups():
+    runs = synthetic.diverge(synthetic.runs(synthetic.PAPER_GRID, 3), "decay200k_l2sq")
+    cells = synthetic.summary(runs)
+    assert "2 of these 18 runs diverged" in captions.caption("figure_4", cells)
+    assert "Crosses are the runs that diverged, 2 of 69" in captions.caption("seed_strip", cells)
+    assert "diverged" not in captions.caption("figure_1", cells)
+    assert "diverged" not in captions.caption("figure_4", synthetic.cells(synthetic.PAPER_GRID, 3))
+
+
+def test_caption_of_smoothness_says_how_it_is_defined():
+    text = captions.caption("learning", synthetic.cells(synthetic.PAPER_GRID, 3))
+    assert f"moving average over {learning.WINDOW} iterations" in text
+    assert f"the first {100 * learning.BURN_IN:g} % of training" in text
+    assert f"made {100 * aggregate.LEARNED:g} % of the way" in text
 
 
 def test_captions_count_seeds_and_episodes_from_the_tables():

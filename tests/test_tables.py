@@ -96,6 +96,45 @@ def test_diverged_runs_are_counted_where_people_look(cells, published):
     assert text.count("10 (2 diverged)") == 6
 
 
+def test_behaviour_has_every_cell_by_variant_with_its_values(cells):
+    table = tables.behaviour(cells)
+    assert len(table) == len(cells) == 23
+    assert table["variant"].tolist()[:5] == ["none", "none", "l2", "l2", "l2"]
+    assert table["alpha0"].tolist()[2:5] == [1.0, 1.0, 0.5]
+    for name in ("final_success_rate", "first_hit_step_low", "reward_control_high"):
+        merged = table.merge(cells, on=tables.CELL, suffixes=("", "_given"))
+        assert (merged[name] == merged[f"{name}_given"]).all(), name
+    shown = tables.readable(cells.iloc[:1].assign(share_within_radius=0.0456, share_within_radius_low=float("nan")))
+    assert shown["Share of steps within the radius"].tolist() == ["0.046"]
+
+
+def test_measure_that_an_older_table_lacks_is_left_out(cells):
+    older = cells.drop(columns=[name for name in cells if "share_within_radius" in name])
+    frame = tables.readable(tables.behaviour(older))
+    assert "Share of steps within the radius" not in frame
+    assert "Success at the last step" in frame
+    assert "Share of steps within the radius" in tables.readable(tables.behaviour(cells))
+
+
+def test_learning_says_how_many_runs_reached_the_threshold(cells):
+    runs = synthetic.runs(synthetic.PAPER_GRID)
+    slow = (runs["variant"] == "l2sq") & (runs["seed"] < 3)
+    runs.loc[slow, "steps_to_threshold"] = float("nan")
+    table = tables.learning(synthetic.summary(runs), runs)
+    frame = tables.readable(table).set_index("Variant")
+    assert set(frame.loc["L2²", "reached by"]) == {"7 of 10"}
+    assert set(frame.loc["none", "reached by"]) == {"10 of 10"}
+    assert frame.loc["L2²", "Steps to the threshold (thousands)"].iloc[0].startswith("115 [")  # 2.048 (50 + 6)
+
+
+def test_diverged_runs_are_counted_among_the_measures():
+    runs = synthetic.diverge(synthetic.runs(synthetic.TOY_GRID, 3))
+    for table in (tables.behaviour(synthetic.summary(runs)), tables.learning(synthetic.summary(runs), runs)):
+        assert tables.readable(table).set_index("Variant")["Seeds"].to_dict() == {
+            "none": "3", "L2": "3 (1 diverged)", "decay 200K": "3",
+        }  # fmt: skip
+
+
 def test_missing_interval_leaves_the_value_alone(cells, published):
     single = cells.assign(mean_return=-10.0, mean_return_low=float("nan"), mean_return_high=float("nan"))
     assert "| \N{MINUS SIGN}10.00 |" in tables.to_markdown(tables.table_1(single, published), "Caption.")

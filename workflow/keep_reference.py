@@ -23,9 +23,7 @@ def main() -> None:
     study = load_study({**require_mapping("config.yaml"), **overlay})
     folders = [RESULTS / cell.folder / block_name(seeds) for cell in study.cells for seeds in study.blocks()]
     blocks = [artifacts.read_json(folder / "manifest.json") for folder in folders]
-    KEPT.mkdir(parents=True, exist_ok=True)
-    for name, table in reference.TABLES.items():
-        artifacts.write_table(KEPT / name, artifacts.read_table(RESULTS / name, table), table)
+    reference.keep_tables(RESULTS, KEPT)
     settings = study.model_dump(mode="json")
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
     record = reference.manifest(settings, digest, blocks)

@@ -2,7 +2,9 @@
 
 import pandas as pd
 
-from reacher_shaping.style import of_protocol
+from reacher_shaping.aggregate import LEARNED
+from reacher_shaping.learning import BURN_IN, WINDOW
+from reacher_shaping.style import in_groups, of_protocol
 
 TITLES = {
     "figure_1": "Training curves",
@@ -12,6 +14,14 @@ TITLES = {
     "table_1": "The six best cells",
     "table_2": "Every cell of the main grid",
     "table_3": "Decay with the squared distance",
+    "behaviour": "What the policies do",
+    "learning": "How they learn",
+    "power": "Seeds that the published gains take",
+    "variance": "Seeds and evaluation",
+    "winners": "The best cell of one seed per cell",
+    "spread": "What one seed per cell reports",
+    "peers": "Other algorithms",
+    "peer_table": "Other algorithms in numbers",
     "seed_strip": "Every run",
     "forest": "Paired differences",
     "success_by_radius": "Success against the radius",
@@ -36,16 +46,60 @@ TEXTS = {
     "table_2": "All cells of the main grid by success rate, mean over {seeds} [{interval}], the published value and "
     "rank beside each. Returns are the environment's own, without shaping.",
     "table_3": "The cells of the paper's appendix, mean over {seeds} [{interval}], the published value beside each.",
+    "behaviour": "Every cell, mean over {seeds} [{interval}]. Success at the last step and the share of an episode's "
+    "steps that end within the radius tell staying at the target from passing it; the step of the first hit is a mean "
+    "over the episodes that have one. The return is the sum of its two parts, minus the distances and minus the "
+    "control cost.",
+    "learning": "Measures of the unshaped training return, mean over {seeds} [{interval}]. Steps to the threshold: "
+    "environment steps until the curve has made {learned} of the way from where the unshaped agent starts to its peak, "
+    "over the runs that get there; the mean return while training is the area under the curve per iteration. "
+    "Smoothness is measured twice. Drop from the peak: the highest point of the curve less its last one, both of its "
+    "moving average over {window} iterations, so that a single lucky iteration is no peak. Roughness: the standard "
+    "deviation of the changes from one iteration to the next, divided by the mean absolute return. Changes leave out "
+    "the level and slow trends; the division keeps cells with larger returns from looking rougher for that alone; the "
+    "first {burn_in} of training, where the steep rise is learning and no instability, does not count.",
+    "power": "Per shaped cell: the published gain in success over none at the same budget, the standard deviation of "
+    "the paired differences to none over our seeds, and the power of a two-sided paired t test at 5 % to see such a "
+    "gain.",
+    "variance": "The variance of the success rate over the runs of a cell, in two parts, each as a standard deviation. "
+    "The part of the evaluation is the binomial noise of so many episodes, an upper bound since all runs meet the "
+    "same resets.",
+    "winners": "How often each cell of the main grid has the highest success rate in a study with one seed per cell.",
+    "spread": "Quantiles over studies with one seed per cell of what such a study reports; the last column is the "
+    "published one.",
+    "peers": "A dot per seed, the bar is the mean and the line its 95 % interval. The budgets differ. The controller "
+    "solves the task by inverse kinematics, without learning.",
+    "peer_table": "Mean over seeds [95 % interval]: of the peers a t interval, since their seeds are few, of none as "
+    "in the other tables. Actions are sampled as in the paper's evaluation, in the last two columns the mean action.",
     "seed_strip": "Success rate of every run: a dot per seed, the bar is the mean and the line its interval "
     "({interval}); diamonds are the published single runs.",
     "forest": "Paired differences between variants on common seeds and the same evaluation episodes: mean and 95 % "
     "interval.",
     "success_by_radius": "Share of episodes in which the fingertip came within a given distance of the target at any "
-    "step, mean over seeds with 95 % interval. The dotted line is the study's radius.",
+    "step, mean over seeds with 95 % interval. The dotted line is the study's radius; dashed stands none of the same "
+    "budget where a setting has none of its own.",
     "lottery": "How often each statement would have come out had the study trained one seed per cell, from "
     "resampling the runs of this study.",
     "long_episodes": "The trained policies on episodes longer than they were trained on, mean over seeds with 95 % "
-    "interval.",
+    "interval. Dashed: none of the same budget where a setting has none of its own.",
+}
+
+# What to say of runs that diverged, and the groups of variants whose runs it counts.
+_MAIN, _APPENDIX = ("none", "constant", "decay"), ("decay_l2sq",)
+_IN_CURVES = "{count} of these {runs} runs diverged: past its last finite return a run is no longer in the mean."
+_IN_TABLES = "{count} of these {runs} runs diverged (see Seeds): a measure without a finite value is not in the mean."
+DIVERGED = {
+    "figure_1": (_MAIN, _IN_CURVES),
+    "figure_4": (_APPENDIX, _IN_CURVES),
+    "figure_2": ((*_MAIN, *_APPENDIX), "{count} of these {runs} runs diverged."),
+    "seed_strip": (
+        (*_MAIN, *_APPENDIX),
+        "Crosses are the runs that diverged, {count} of {runs}; one without a value stands at the left edge.",
+    ),
+    "table_2": (_MAIN, _IN_TABLES),
+    "table_3": (_APPENDIX, _IN_TABLES),
+    "behaviour": ((*_MAIN, *_APPENDIX), _IN_TABLES),
+    "learning": ((*_MAIN, *_APPENDIX), _IN_TABLES),
 }
 
 
@@ -60,11 +114,23 @@ def caption(stem: str, cells: pd.DataFrame, runs: pd.DataFrame | None = None, pr
     """The caption of a figure or table, with the counts of seeds and episodes found in the tables."""
     ours = of_protocol(cells, protocol)
     episodes = sorted(runs["episodes"].unique()) if runs is not None else []
-    return TEXTS.get(stem, "").format(
+    text = TEXTS.get(stem, "").format(
         seeds=_count(sorted(ours["seeds"].unique()), "seed"),
         episodes=" to ".join(f"{count:,}" for count in (episodes[:1] + episodes[1:][-1:])) or "the",
         interval=" or ".join(sorted(ours["interval"].unique())),
+        window=WINDOW,
+        learned=f"{100 * LEARNED:g} %",
+        burn_in=f"{100 * BURN_IN:g} %",
     )
+    return f"{text} {_divergence(stem, ours)}".strip()
+
+
+def _divergence(stem: str, cells: pd.DataFrame) -> str:
+    """A sentence on the runs behind a figure or table that diverged; nothing where none did."""
+    groups, text = DIVERGED.get(stem, ((), ""))
+    shown = in_groups(cells, groups)
+    count = int(shown["diverged"].sum())
+    return text.format(count=count, runs=int(shown["seeds"].sum())) if count else ""
 
 
 def _count(numbers: list[int], noun: str) -> str:

@@ -1,5 +1,6 @@
 """Figures the paper does not have. Tables in, matplotlib figures out; no statistic is computed here."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -14,6 +15,7 @@ from reacher_shaping.bars import PUBLISHED
 from reacher_shaping.style import (
     STYLE,
     budget_label,
+    cell_order,
     empty_panel,
     of_protocol,
     setting_label,
@@ -23,6 +25,21 @@ from reacher_shaping.style import (
     variant_order,
 )
 
+DOT: dict[str, Any] = {
+    "marker": "o",
+    "linestyle": "none",
+    "markersize": 5.5,
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.6,
+}
+LOST_COLOR = "#B00020"
+CROSS: dict[str, Any] = {
+    "marker": "x",
+    "linestyle": "none",
+    "color": LOST_COLOR,
+    "markersize": 6.5,
+    "markeredgewidth": 1.8,
+}
 CELL = ["variant", "budget", "alpha0"]
 AXIS_LABELS = {
     "success_rate": "Success rate: within the radius at any step",
@@ -43,7 +60,7 @@ def seed_strip(
     """A row per cell: a dot per run, a bar at the mean with its interval, a diamond where the paper has a value.
 
     `runs` and `cells` as in the study's tables; `metric` is one of their measures; `published` comes from
-    `tables.published_cells`.
+    `tables.published_cells`. A run that diverged is a cross.
     """
     ours = of_protocol(cells, protocol)
     figure = Figure(figsize=(7.5, 1.3 + 0.27 * max(len(ours), 4)))
@@ -51,38 +68,73 @@ def seed_strip(
     if ours.empty:
         empty_panel(axes, "not in this study")
         return figure
-    values = of_protocol(runs, protocol).groupby(CELL)[metric]
+    parts = of_protocol(runs, protocol).groupby(CELL)
     theirs = {} if published is None or metric not in published else published.set_index(CELL)[metric].to_dict()
-    rows = sorted(ours.to_dict("records"), key=_row_order)
+    rows = sorted(ours.to_dict("records"), key=cell_order)
     for y, row in enumerate(rows):
         key = (row["variant"], row["budget"], row["alpha0"])
-        color = variant_color(row["variant"])
-        dots = values.get_group(key).to_numpy()
-        axes.plot(dots, np.full(len(dots), y), "o", color=color, markersize=4.5, alpha=0.55, mew=0, label="_runs")
-        axes.plot([row[f"{metric}_low"], row[f"{metric}_high"]], [y, y], color="black", lw=1.4, label="_interval")
-        axes.plot(row[metric], y, "|", color="black", markersize=11, markeredgewidth=2, label="_mean")
+        draw_runs(axes, y, parts.get_group(key), row, metric, variant_color(row["variant"]))
         if key in theirs:
             axes.plot(theirs[key], y, linestyle="none", label="_published", zorder=4, **PUBLISHED)
-    names = [f"{variant_label(row['variant'])} · {setting_label(row['budget'], row['alpha0'])}" for row in rows]
-    _name_rows(axes, names)
+    name_rows(axes, [_name(row) for row in rows])
+    _shade_variants(axes, rows)
     if metric.endswith("rate"):
         axes.xaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
     axes.set_xlabel(AXIS_LABELS.get(metric, metric.replace("_", " ")))
-    handles = [
-        Line2D([], [], marker="o", color="#777777", linestyle="none", markersize=4.5, label="one seed"),
-        Line2D([], [], marker="|", color="black", markersize=9, markeredgewidth=2, label="mean and interval"),
-        Line2D([], [], linestyle="none", label="published (one run)", **PUBLISHED),
-    ]
-    figure.legend(handles=handles if theirs else handles[:2], loc="outside lower center", ncols=3)
+    explain_runs(figure, published=bool(theirs))
     return figure
 
 
-def _name_rows(axes: Axes, names: list[str]) -> None:
+def draw_runs(axes: Axes, y: int, runs: pd.DataFrame, row: Mapping[Any, Any], metric: str, color: str) -> None:
+    """Row `y` of a strip: a dot per run, and the mean and interval of `row`.
+
+    A run that diverged is a cross at its value, or at the left edge where it has none.
+    """
+    interval = [row[f"{metric}_low"], row[f"{metric}_high"]]
+    axes.plot(interval, [y, y], color="#555555", lw=1.2, label="_interval", zorder=2)
+    axes.plot(row[metric], y, "|", color="black", markersize=12, markeredgewidth=2, label="_mean", zorder=2.5)
+    values = runs[metric].to_numpy(dtype=float)
+    lost = ~np.isfinite(values)
+    diverged = runs["diverged"].to_numpy(dtype=bool) | lost if "diverged" in runs else lost
+    dots, crosses = values[~diverged], values[diverged & ~lost]
+    axes.plot(dots, np.full(len(dots), y), color=color, label="_runs", zorder=3, **DOT)
+    if len(crosses):
+        axes.plot(crosses, np.full(len(crosses), y), label="_diverged", zorder=3.5, **CROSS)
+    if lost.any():
+        edge = axes.get_yaxis_transform()  # x in parts of the axis, y in rows
+        axes.plot(0.012, y, transform=edge, label="_diverged", zorder=3.5, **CROSS)
+        if lost.sum() > 1:
+            axes.text(0.027, y, f"{lost.sum()} runs", transform=edge, va="center", fontsize=8, color=LOST_COLOR)
+
+
+def explain_runs(figure: Figure, published: bool = False) -> None:
+    """A legend under a strip for what its panels show."""
+    drawn = {line.get_label() for axes in figure.axes for line in axes.lines}
+    handles = [
+        Line2D([], [], color="#777777", label="one seed", **DOT),
+        Line2D([], [], color="black", marker="|", markersize=9, markeredgewidth=2, lw=1.2, label="mean and interval"),
+    ]
+    if published:
+        handles.append(Line2D([], [], linestyle="none", label="published (one run)", **PUBLISHED))
+    if "_diverged" in drawn:
+        handles.append(Line2D([], [], label="diverged", **CROSS))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+def name_rows(axes: Axes, names: list[str]) -> None:
     """Rows from top to bottom, each with its name."""
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
+
+
+def _shade_variants(axes: Axes, rows: list[dict[Any, Any]]) -> None:
+    """A light band behind every second variant, so that a row is found again at the other side."""
+    variants = list(dict.fromkeys(row["variant"] for row in rows))
+    for y, row in enumerate(rows):
+        if variants.index(row["variant"]) % 2 == 0:
+            axes.axhspan(y - 0.5, y + 0.5, color="#F3F5F7", linewidth=0, zorder=0)
 
 
 @mpl.rc_context(STYLE)
@@ -101,8 +153,9 @@ def forest(
     if ours.empty:
         empty_panel(axes, "not in this study")
         return figure
-    rows = sorted(ours.to_dict("records"), key=_row_order)
-    axes.axvline(0, color="#555555", linewidth=1, linestyle="--", label="_zero")
+    rows = sorted(ours.to_dict("records"), key=cell_order)
+    _shade_variants(axes, rows)
+    axes.axvline(0, color="#555555", linewidth=1, linestyle="--", label="_zero", zorder=1)
     for y, row in enumerate(rows):
         color = variant_color(row["variant"])
         clear = row["ci_low"] > 0 or row["ci_high"] < 0
@@ -110,24 +163,30 @@ def forest(
         face = color if clear else "white"
         axes.plot(row["difference"], y, "o", color=color, markerfacecolor=face, markersize=5.5, label="_difference")
         if np.isfinite(row["p_holm"]):
-            text = f"p = {row['p_holm']:.3f}" if row["p_holm"] >= 0.001 else "p < 0.001"
-            axes.annotate(
-                text, (1, y), xycoords=("axes fraction", "data"), xytext=(5, 0), textcoords="offset points",
-                va="center", fontsize=8, color="#444444", annotation_clip=False,
-            )  # fmt: skip
-    _name_rows(axes, [_comparison(row) for row in rows])
-    axes.set_xlabel(f"Paired difference in {metric.replace('_', ' ')}")
+            _write_beside(axes, y, f"{row['p_holm']:.3f}" if row["p_holm"] >= 0.001 else "< 0.001")
+    _write_beside(axes, -1, "p (Holm)")
+    others = {_partner(row) for row in rows}
+    shared = others.pop() if len(others) == 1 else None  # said once, under the axis
+    name_rows(axes, [_name(row) + ("" if shared else f"  less  {_partner(row)}") for row in rows])
+    label = f"Paired difference in {metric.replace('_', ' ')}"
+    axes.set_xlabel(f"{label}: less {shared}, same seeds" if shared else label)
     return figure
 
 
-def _row_order(row: dict[Any, Any]) -> tuple[Any, ...]:
-    """Rows by variant, full alpha0 first, then by budget."""
-    return variant_order(row["variant"]), -row["alpha0"], row["budget"]
+def _write_beside(axes: Axes, y: float, text: str) -> None:
+    """Text at the right of row `y`."""
+    axes.annotate(
+        text, (1, y), xycoords=("axes fraction", "data"), xytext=(5, 0), textcoords="offset points",
+        va="center", fontsize=8, color="#444444", annotation_clip=False,
+    )  # fmt: skip
 
 
-def _comparison(row: dict[Any, Any]) -> str:
-    """Both cells of a comparison; of the second only what differs."""
-    ours = f"{variant_label(row['variant'])} · {setting_label(row['budget'], row['alpha0'])}"
+def _name(row: dict[Any, Any]) -> str:
+    return f"{variant_label(row['variant'])} · {setting_label(row['budget'], row['alpha0'])}"
+
+
+def _partner(row: dict[Any, Any]) -> str:
+    """The second cell of a comparison, by what is different in it; `none` has no weight of its own."""
     parts = []
     if row["other_variant"] != row["variant"]:
         parts.append(variant_label(row["other_variant"]))
@@ -135,7 +194,7 @@ def _comparison(row: dict[Any, Any]) -> str:
         parts.append(f"α₀ = {row['other_alpha0']:g}")
     if row["other_budget"] != row["budget"]:
         parts.append(budget_label(row["other_budget"]))
-    return f"{ours}  less  {' · '.join(parts)}"
+    return " · ".join(parts)
 
 
 @mpl.rc_context(STYLE)
@@ -166,31 +225,52 @@ def long_episodes(frame: pd.DataFrame, protocol: str | None = None, metric: str 
 
 
 def _lines_by_setting(frame: pd.DataFrame, x: str, y: str, x_label: str, y_label: str, scale: float) -> Figure:
-    """A line per variant with a band, a panel per budget and alpha0."""
+    """A line per variant with a band, a panel per budget and alpha0, two panels a row where there are many.
+
+    Where a setting has no unshaped cell, that of the same budget is drawn in, dashed.
+    """
     settings = settings_of(frame)
-    figure = Figure(figsize=(2.9 * max(len(settings), 1) + 1.6, 3.3))
-    panels = figure.subplots(1, max(len(settings), 1), sharey=True, squeeze=False)[0]
     if not settings:
-        empty_panel(panels[0], "not in this study")
+        figure = Figure(figsize=(4.5, 3.3))
+        empty_panel(figure.subplots(), "not in this study")
         return figure
+    columns = len(settings) if len(settings) <= 3 else 2
+    lines = -(-len(settings) // columns)
+    figure = Figure(figsize=(3.3 * columns + 1.6, 3.0 * lines + 0.2))
+    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     handles: dict[str, Line2D] = {}
-    for axes, (budget, alpha0) in zip(panels, settings, strict=True):
+    for axes, (budget, alpha0) in zip(panels.flat, settings, strict=False):
         axes.set_title(setting_label(budget, alpha0))
-        axes.set_xlabel(x_label)
-        here = frame[(frame["budget"] == budget) & (frame["alpha0"] == alpha0)]
-        for variant in sorted(here["variant"].unique(), key=variant_order):
-            line = here[here["variant"] == variant].sort_values(x)
-            places, color = line[x].to_numpy() * scale, variant_color(variant)
-            low, high = line[f"{y}_low"].to_numpy(), line[f"{y}_high"].to_numpy()
-            axes.fill_between(places, low, high, color=color, alpha=0.08, linewidth=0)
-            (handles[variant_label(variant)],) = axes.plot(
-                places, line[y].to_numpy(), color=color, marker=".", label=variant_label(variant)
-            )
-    if y.endswith("rate"):
-        panels[0].yaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
-    panels[0].set_ylabel(y_label)
-    panels[-1].legend(list(handles.values()), list(handles), loc="center left", bbox_to_anchor=(1.02, 0.5))
+        at_budget = frame[frame["budget"] == budget]
+        here = at_budget[at_budget["alpha0"] == alpha0]
+        borrowed = at_budget[(at_budget["variant"] == "none") & ("none" not in set(here["variant"]))]
+        for variant, line in [*borrowed.groupby("variant"), *here.groupby("variant")]:
+            handle = _draw_line(axes, line.sort_values(x), x, y, scale, dashed=line["alpha0"].iloc[0] != alpha0)
+            handles.setdefault(str(variant), handle)
+        if y.endswith("rate"):
+            axes.yaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
+    for axes in panels.flat[len(settings) :]:
+        empty_panel(axes, "")
+    figure.supxlabel(x_label, fontsize=9)
+    figure.supylabel(y_label, fontsize=9)
+    names = sorted(handles, key=variant_order)
+    figure.legend(
+        [handles[name] for name in names], [variant_label(name) for name in names], loc="outside right center"
+    )
     return figure
+
+
+def _draw_line(axes: Axes, line: pd.DataFrame, x: str, y: str, scale: float, dashed: bool) -> Line2D:
+    """One variant's line with its band; dashed and without one where it stands in from another setting."""
+    variant = str(line["variant"].iloc[0])
+    places, color = line[x].to_numpy() * scale, variant_color(variant)
+    low, high = line[f"{y}_low"].to_numpy(), line[f"{y}_high"].to_numpy()
+    if not dashed:
+        axes.fill_between(places, low, high, color=color, alpha=0.07, linewidth=0)
+    style = "--" if dashed else "-"
+    label = f"_{variant} of the same budget" if dashed else variant_label(variant)
+    (drawn,) = axes.plot(places, line[y].to_numpy(), style, color=color, marker=".", label=label)
+    return drawn
 
 
 @mpl.rc_context(STYLE)
@@ -208,7 +288,7 @@ def lottery(frame: pd.DataFrame) -> Figure:
     bars = axes.barh(range(len(frame)), frame["share"], color="#0072B2", height=0.65)
     labels = [f"{100 * share:.1f} %" for share in frame["share"]]
     axes.bar_label(bars, labels, padding=4, fontsize=8)
-    _name_rows(axes, [str(statement) for statement in frame["statement"]])
+    name_rows(axes, [str(statement).replace("`", "").replace("alpha0", "α₀") for statement in frame["statement"]])
     axes.set_xlim(0, 1.08)
     axes.xaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
     axes.set_xlabel("Share of single-seed studies in which it comes out")

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,9 +33,25 @@ TABLES = {
 }
 """The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
 
+OPTIONAL = {"peers.parquet": artifacts.PEERS}
+"""Tables that are kept with it where the run has them."""
+
 COMPARED = ("success_rate", "mean_return")
 LEVEL = 0.05
 _BLOCK = re.compile(r"(<!-- reference: begin -->\n).*(<!-- reference: end -->)", re.DOTALL)
+
+
+def keep_tables(results: Path, kept: Path) -> None:
+    """Write the reference tables of `results` into the folder `kept`; an optional one that is not there is none there.
+
+    Raises ArtifactError where another is missing or damaged.
+    """
+    kept.mkdir(parents=True, exist_ok=True)
+    for name, table in (TABLES | OPTIONAL).items():
+        if name in OPTIONAL and not (results / name).exists():
+            (kept / name).unlink(missing_ok=True)
+            continue
+        artifacts.write_table(kept / name, artifacts.read_table(results / name, table), table)
 
 
 def compare(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:

@@ -11,12 +11,14 @@ import jinja2
 import numpy as np
 import pandas as pd
 
-from reacher_shaping import answers, captions, tables
-from reacher_shaping.style import of_protocol, setting_label, stochastic, variant_label, variant_order
+from reacher_shaping import answers, captions, peer_results, precision, tables
+from reacher_shaping.grids import Grid, controllers_grid, of_table, settings_grid, study_grid
+from reacher_shaping.style import cell_order, of_protocol, setting_label, variant_label
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
 MEDIA_BUDGET = 11_000_000  # bytes of videos put into the file; the rest are links
 MANIFEST_NUMBERS = ("env_steps", "wall_seconds", "cpu_seconds", "env_steps_per_second")
+OWN_SECTION = ("lottery", "peers")  # figures that stand in a section of their own; other further ones come together
 VERDICT_MARKS = {"reproduced": "✓", "not reproduced": "✗", "inconclusive": "?", "untestable": "\N{EN DASH}"}
 
 
@@ -26,8 +28,9 @@ class Inputs:
 
     `study` holds the resolved settings; `published` comes from `tables.published_cells`; `controllers` has
     `controller, success_rate, final_success_rate, mean_return, final_distance`; `figures` maps names such as
-    `figure_1` to SVG files, in the order to show; `ledger` has the claims' `id, evidence, shown_in`; relative links
-    start at `folder`.
+    `figure_1` to SVG files, in the order to show; `power`, `variance`, `winners` and `spread` are the study's tables of
+    these names, `peers` that of the other algorithms; `ledger` has the claims' `id, evidence, shown_in`; relative
+    links start at `folder`.
     """
 
     study: Mapping[str, Any]
@@ -37,6 +40,11 @@ class Inputs:
     correlation: pd.DataFrame | None = None
     claims: pd.DataFrame | None = None
     controllers: pd.DataFrame | None = None
+    power: pd.DataFrame | None = None
+    variance: pd.DataFrame | None = None
+    winners: pd.DataFrame | None = None
+    spread: pd.DataFrame | None = None
+    peers: pd.DataFrame | None = None
     figures: Mapping[str, Path] = field(default_factory=dict)
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
@@ -46,15 +54,6 @@ class Inputs:
     protocol: str | None = None
     folder: Path = Path("report")
     template: Path = Path("report/report.html.j2")
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A table to show: its headings, its rows, and the columns that are text."""
-
-    headings: list[str]
-    rows: list[list[str]]
-    texts: frozenset[int] = frozenset({0})
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,11 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         "run_count": int(cells["seeds"].sum()) if len(cells) else 0,
         "diverged": int(cells["diverged"].sum()) if len(cells) else 0,
         "pictures": pictures,
-        "further": [picture for name, picture in pictures.items() if not name.startswith("figure_")],
+        "further": [
+            picture for name, picture in pictures.items() if not name.startswith("figure_") and name not in OWN_SECTION
+        ],
         "tables": _tables(cells, inputs),
+        "sentences": _sentences(inputs),
         "controllers": controllers_grid(inputs.controllers, inputs.protocol),
         "claims": _claims(inputs),
         "videos": videos(inputs, cells),
@@ -103,75 +105,43 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     }
 
 
-def settings_grid(study: Mapping[str, Any]) -> Grid:
-    """Settings of each protocol side by side: a row per setting, a column per protocol."""
-    protocols = study.get("protocols", {})
-    flat = {name: _flatten({k: v for k, v in settings.items() if k != "name"}) for name, settings in protocols.items()}
-    keys = list(dict.fromkeys(key for settings in flat.values() for key in settings))
-    rows = [[key, *(plain(settings.get(key, "")) for settings in flat.values())] for key in keys]
-    return Grid(["Setting", *flat], rows)
-
-
-def _flatten(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in settings.items():
-        name = f"{prefix}{key.replace('_', ' ')}"
-        flat |= _flatten(value, f"{name}: ") if isinstance(value, Mapping) else {name: value}
-    return flat
-
-
-def plain(value: Any) -> str:
-    """A setting as people write it."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, int):
-        return f"{value:,}"
-    if isinstance(value, list | tuple):
-        return ", ".join(plain(entry) for entry in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def study_grid(cells: pd.DataFrame) -> Grid:
-    """Seeds evaluated per variant (rows), budget and alpha0 (columns)."""
-    if cells.empty:
-        return Grid(["Variant"], [])
-    counts = cells.pivot_table(index="variant", columns=["alpha0", "budget"], values="seeds", sort=False)
-    counts = counts.sort_index(axis="columns", level=[0, 1], ascending=[False, True])
-    settings = [(float(pair[0]), int(pair[1])) for pair in counts.columns.to_list()]
-    counts = counts.loc[sorted(counts.index, key=variant_order)]
-    rows = [
-        [variant_label(str(name)), *("" if np.isnan(count) else f"{count:.0f}" for count in row)]
-        for name, row in zip(counts.index, counts.to_numpy(dtype=float), strict=True)
-    ]
-    return Grid(["Variant", *(setting_label(budget, alpha0) for alpha0, budget in settings)], rows)
-
-
 def _tables(cells: pd.DataFrame, inputs: Inputs) -> dict[str, dict[str, Any]]:
-    """The paper's three tables with titles and captions."""
-    made = {"table_1": tables.table_1, "table_2": tables.table_2, "table_3": tables.table_3}
-    shown = {}
-    for name, make in made.items():
-        frame = tables.readable(make(cells, inputs.published))
-        grid = Grid(list(frame.columns), frame.to_numpy().tolist(), frozenset({1}))
-        shown[name] = {
-            "title": captions.title(name),
-            "caption": captions.caption(name, cells, inputs.runs),
-            "grid": grid,
-        }
-    return shown
+    """The tables with titles and captions: the paper's three, our measures, and those whose tables were given."""
+    protocol = inputs.protocol
+    grids = {
+        name: of_table(make(cells, inputs.published))
+        for name, make in (("table_1", tables.table_1), ("table_2", tables.table_2), ("table_3", tables.table_3))
+    }
+    grids["behaviour"] = of_table(tables.behaviour(cells))
+    grids["learning"] = of_table(tables.learning(cells, of_protocol(inputs.runs, protocol)))
+    if inputs.power is not None:
+        grids["power"] = precision.power_grid(inputs.power, protocol)
+    if inputs.variance is not None:
+        grids["variance"] = precision.variance_grid(inputs.variance, protocol)
+    if inputs.winners is not None:
+        grids["winners"] = precision.winners_grid(inputs.winners)
+    if inputs.spread is not None:
+        grids["spread"] = precision.spread_grid(inputs.spread, inputs.published)
+    if inputs.peers is not None:
+        grids["peer_table"] = of_table(peer_results.peer_table(inputs.peers, cells, inputs.controllers, protocol))
+    return {
+        name: {"title": captions.title(name), "caption": captions.caption(name, cells, inputs.runs), "grid": grid}
+        for name, grid in grids.items()
+    }
 
 
-def controllers_grid(controllers: pd.DataFrame | None, protocol: str | None = None) -> Grid | None:
-    """Policies that need no learning, in the measures of the tables."""
-    if controllers is None or controllers.empty:
-        return None
-    controllers = stochastic(controllers, protocol)
-    keep = ["success_rate", "final_success_rate", "mean_return", "final_distance"]
-    frame = tables.readable(controllers[[name for name in keep if name in controllers]])
-    names = [str(name).replace("_", " ") for name in controllers["controller"]]
-    headings = [heading.removesuffix(" [95 % interval]") for heading in frame.columns]
-    rows = [[name, *row] for name, row in zip(names, frame.to_numpy().tolist(), strict=True)]
-    return Grid(["Policy", *headings], rows)
+def _sentences(inputs: Inputs) -> dict[str, str]:
+    """What the tables that were given say, in a sentence each."""
+    said = {}
+    if inputs.power is not None:
+        said["power"] = precision.power_sentence(inputs.power, inputs.protocol)
+    if inputs.variance is not None:
+        said["variance"] = precision.variance_sentence(inputs.variance, inputs.protocol)
+    if inputs.winners is not None:
+        said["winners"] = precision.winners_sentence(inputs.winners)
+    if inputs.peers is not None:
+        said["peers"] = peer_results.budgets_sentence(inputs.peers)
+    return said
 
 
 def _claims(inputs: Inputs) -> list[dict[Any, Any]]:
@@ -194,10 +164,7 @@ def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
     """One video per cell, MP4 where there is one, embedded while the size budget lasts."""
     chosen = {path.stem: path for path in sorted(inputs.media, key=lambda path: path.suffix != ".gif")}
     shown, left = [], MEDIA_BUDGET
-    order = sorted(
-        cells.to_dict("records"), key=lambda row: (variant_order(row["variant"]), -row["alpha0"], row["budget"])
-    )
-    for row in order:
+    for row in sorted(cells.to_dict("records"), key=cell_order):
         stem = f"{row['protocol']}-{row['variant']}-{row['budget']}-alpha{row['alpha0']:g}"
         path = chosen.pop(stem, None)
         if path is None:

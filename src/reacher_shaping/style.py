@@ -8,7 +8,7 @@ takes the darker shade of its horizon's hue.
 import io
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +84,11 @@ def variant_order(variant: str) -> tuple[int, int, str]:
     horizon = re.search(r"\d+", variant.removesuffix("_l2sq")) if "decay" in variant else None
     groups = ("none", "constant", "decay", "decay_l2sq")
     return groups.index(group(variant)), int(horizon.group()) if horizon else 0, variant
+
+
+def cell_order(row: Mapping[Any, Any]) -> tuple[Any, ...]:
+    """Sort key of a cell's row: by variant, full alpha0 first, then by budget."""
+    return variant_order(row["variant"]), -row["alpha0"], row["budget"]
 
 
 def variant_color(variant: str) -> str:

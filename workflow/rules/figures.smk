@@ -3,10 +3,14 @@ KINDS = ["svg", "pdf", "png"]
 FIGURES = expand("figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=KINDS)
 FURTHER_FIGURES = expand(
     "figures/{name}.{kind}",
-    name=["seed_strip", "forest", "success_by_radius", "long_episodes", "lottery"],
+    name=["seed_strip", "forest", "success_by_radius", "long_episodes", "lottery"] + (["peers"] if PEERS else []),
     kind=KINDS,
 )
-FORMATTED_TABLES = expand("results/tables/table_{number}.{kind}", number=[1, 2, 3], kind=["csv", "md"])
+FORMATTED_TABLES = expand(
+    "results/tables/{name}.{kind}",
+    name=["table_1", "table_2", "table_3", "behaviour", "learning"],
+    kind=["csv", "md"],
+)
 
 
 rule plot_figures:
@@ -39,6 +43,8 @@ rule plot_further:
         radii="results/radii.parquet",
         lengths="results/lengths.parquet",
         lottery="results/lottery.csv",
+        controllers="results/controllers.parquet",
+        peers=PEERS,
     output:
         FURTHER_FIGURES,
     log:
@@ -56,6 +62,7 @@ rule plot_further:
 rule format_tables:
     input:
         **PUBLISHED,
+        runs="results/runs.parquet",
         cells="results/cells.parquet",
     output:
         FORMATTED_TABLES,

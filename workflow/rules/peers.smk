@@ -2,6 +2,7 @@
 PEER_RUNS = expand(
     "results/peers/{algorithm}/seed{seed}.parquet", algorithm=STUDY.peers.budgets, seed=range(STUDY.peers.seeds)
 )
+PEERS = [path for path in ["results/peers.parquet"] if Path(path).exists()]  # an input only once it is there
 
 
 rule peers:

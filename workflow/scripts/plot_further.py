@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, further, style, tables
+from reacher_shaping import artifacts, further, peer_results, style, tables
 
 given = snakemake.input
 
@@ -23,5 +23,9 @@ with logged(snakemake.log[0]):
         "long_episodes": further.long_episodes(lengths, metric="final_distance"),
         "lottery": further.lottery(artifacts.read_table(given.lottery, artifacts.LOTTERY)),
     }
+    if given.peers:
+        peers = artifacts.read_table(given.peers, artifacts.PEERS)
+        controllers = artifacts.read_table(given.controllers, artifacts.CONTROLLERS)
+        figures["peers"] = peer_results.peer_strip(peers, runs, cells, controllers)
     for name, figure in figures.items():
         style.save(figure, Path("figures") / name)
