@@ -6,6 +6,7 @@ More moments at which a training process is killed: REACHER_SHAPING_KILLS=20 pyt
 import contextlib
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -144,9 +145,10 @@ def test_failure_between_training_and_evaluation_keeps_the_policies_and_shows_no
     assert len(policies) == 2
     with project.edited("workflow/scripts/evaluate_block.py", "record = Record()", "record = Record(\n1 / 0)"):
         for _ in range(2):  # the second call must not find the old tables current (snakemake issue 1978)
-            done = project.snakemake("--", TARGET)
+            done = project.snakemake("--until", "aggregate_runs")
             assert done.returncode != 0
             assert not list(project.folder.glob(f"{CELL}/*/episodes.parquet")), "the old evaluation is gone"
+        assert "the tables in results/ are old" in project.snakemake("--", TARGET).stderr, "said if named alone"
         assert {"aggregate_runs", "judge_claims", "build_report", "build_crate"} <= set(project.planned())
         report = project.snakemake("--allowed-rules", "build_report", "--", "report/report.html")
         assert report.returncode != 0, "no report can be made from half a study"
@@ -161,7 +163,9 @@ def test_failure_between_training_and_evaluation_keeps_the_policies_and_shows_no
     [("policy.pt", "evaluate_block"), ("progress.parquet", "aggregate_runs"), ("episodes.parquet", "aggregate_runs")],
 )
 @pytest.mark.parametrize("damage", ["truncated", "empty", "flipped", "swapped"])
-def test_damaged_file_is_named_when_it_is_read(finished, name, reader, damage):
+def test_damaged_file_is_named_when_it_is_read(finished, tmp_path, name, reader, damage):
+    results, saved = finished.folder / "results", tmp_path / "results"
+    shutil.copytree(results, saved)  # Snakemake deletes what a failed job was to make
     block, other = (finished.folder / CELL / seeds for seeds in ("seeds0-0", "seeds1-1"))
     path, content = block / name, (block / name).read_bytes()
     middle = len(content) // 2
@@ -175,7 +179,8 @@ def test_damaged_file_is_named_when_it_is_read(finished, name, reader, damage):
     try:
         done = finished.snakemake("--forcerun", reader, "--allowed-rules", reader, "--", target)
     finally:
-        path.write_bytes(content)
+        shutil.rmtree(results)
+        shutil.copytree(saved, results)
     assert done.returncode != 0
     [said] = [line for line in done.stderr.splitlines() if "ArtifactError" in line]
     assert f"{CELL}/seeds0-0/{name}: is not the file that" in said
