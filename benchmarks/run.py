@@ -30,10 +30,12 @@ from ladder import RADIUS, engine, rungs
 from present import write
 from side_by_side import Measure, Workload, measure, pin, ratios, take_turns
 
+from reacher_shaping import jobs
 from reacher_shaping.config import Cell, load_study
 from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.reacher import EPISODE_STEPS
+from reacher_shaping.train import TrainState
 
 TRAINED_LOG_STD = -2.2
 """Policies are evaluated with the spread that training leaves, 0.11; a wide one keeps the arm at its joint limit."""
@@ -188,6 +190,20 @@ def measure_jobs(size: Size) -> Iterator[Measure]:
     yield measure("jobs", f"{label}, start to first rollout", start, "s", must=6, aim=4, lower_is_better=True)
     yield measure("jobs", f"{label}, CPU time of the start", seconds, "s")
     yield measure("jobs", f"{label}, peak memory", memory, "MB", must=800, aim=500, lower_is_better=True)
+    share = [100 * seconds / jobs.SECONDS_PER_CHECKPOINT for seconds in checkpoint_seconds(size)]
+    yield measure("jobs", f"{label}, checkpoints' share of its time", share, "%", must=2, lower_is_better=True)
+
+
+def checkpoint_seconds(size: Size) -> list[float]:
+    """Wall seconds to keep one checkpoint of the study's longest cell."""
+    cell = max(load_study(HERE.parent / "config.yaml").cells, key=lambda cell: cell.budget)
+    state, seconds = TrainState.start(cell, range(size.block)), []
+    with tempfile.TemporaryDirectory(dir=HERE.parent) as folder:
+        for _ in range(size.repeats + 1):
+            begun = time.perf_counter()
+            jobs.save_checkpoint(Path(folder) / "key" / "checkpoint.pt", state)
+            seconds.append(time.perf_counter() - begun)
+    return seconds[1:]
 
 
 def measure_ladder(size: Size) -> Iterator[Measure]:

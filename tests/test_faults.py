@@ -86,6 +86,11 @@ def undisturbed(tmp_path_factory) -> dict[str, str]:
     return found
 
 
+def test_one_core_gives_the_bytes_of_all(project, undisturbed):
+    project.run("--cores", "1", "--", TARGET)
+    assert made(project) == undisturbed
+
+
 @pytest.fixture
 def project(tmp_path) -> Project:
     return new_project(tmp_path)
