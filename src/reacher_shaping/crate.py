@@ -56,8 +56,8 @@ def describe(
             properties={
                 "name": path.name,
                 "encodingFormat": FORMATS.get(path.suffix, BINARY),
-                "contentSize": path.stat().st_size,
                 "sha256": artifacts.sha256(path),
+                "contentSize": path.stat().st_size,
             },
         )
     versions = {f"{package}=={version}" for manifest in manifests for package, version in manifest["versions"].items()}
