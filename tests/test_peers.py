@@ -1,14 +1,23 @@
 """Other algorithms on the same task: settings handed over, and evaluation against stepping Gymnasium itself."""
 
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
+import synthetic
 from cells import cell
 
 from reacher_shaping import artifacts, peers
 from reacher_shaping.config import Evaluation
 from reacher_shaping.streams import Purpose, stream
 
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "report" / "reference"
 EVALUATION = Evaluation(episodes=4, radius=0.05)
 
 
@@ -52,3 +61,40 @@ def test_runs_fit_their_table(tmp_path):
     run = peers.peer_run("sac", 0, 110, cell("none").protocol, EVALUATION, root_seed=0)
     artifacts.write_table(tmp_path / "peers.parquet", run, artifacts.PEERS)
     assert artifacts.read_table(tmp_path / "peers.parquet", artifacts.PEERS).equals(run)
+
+
+def _planned(folder):
+    """Inputs and outputs of each job of a dry run of the reference run's report."""
+    rules = ["plot_figures", "plot_further", "format_tables", "run_notebook", "build_reference_report"]
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--snakefile",
+        ROOT / "Snakefile",
+        "--directory",
+        folder,
+        "--cores",
+        "1",
+    ]
+    command += ["--dry-run", "--allowed-rules", *rules, "--", "report/reference.html"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    jobs = re.findall(r"^rule (\w+):\n    input: (.*)\n    output: (.*)$", done.stdout, re.MULTILINE)
+    return {rule: (inputs.split(", "), outputs.split(", ")) for rule, inputs, outputs in jobs}
+
+
+@pytest.mark.skipif(not (KEPT / "manifest.json").exists(), reason="no reference run is kept")
+def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
+    shutil.copytree(KEPT, tmp_path / "results")
+    table = tmp_path / "results" / "peers.parquet"
+    table.unlink(missing_ok=True)
+    for there in (False, True):
+        if there:
+            artifacts.write_table(table, synthetic.peers(), artifacts.PEERS)
+        jobs = _planned(tmp_path)
+        assert ("results/peers.parquet" in jobs["plot_further"][0]) is there
+        assert ("figures/peers.svg" in jobs["plot_further"][1]) is there
+        report = jobs["build_reference_report"][0]
+        assert ("results/peers.parquet" in report, "figures/peers.svg" in report) == (there, there)
+        assert "train_peer" not in jobs
