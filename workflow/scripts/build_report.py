@@ -27,7 +27,7 @@ with logged(snakemake.log[0]):
         variance=artifacts.read_table(given.variance, artifacts.VARIANCE),
         winners=artifacts.read_table(given.winners, artifacts.WINNERS),
         spread=artifacts.read_table(given.spread, artifacts.SPREAD),
-        peers=artifacts.read_table(given.peers, artifacts.PEERS) if given.peers else None,
+        peers=artifacts.read_table(given.peers[0], artifacts.PEERS) if given.peers else None,
         published=tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3)),
         ledger=yaml.safe_load(Path(given.ledger).read_text(encoding="utf-8")),
         figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},

@@ -24,7 +24,7 @@ with logged(snakemake.log[0]):
         "lottery": further.lottery(artifacts.read_table(given.lottery, artifacts.LOTTERY)),
     }
     if given.peers:
-        peers = artifacts.read_table(given.peers, artifacts.PEERS)
+        peers = artifacts.read_table(given.peers[0], artifacts.PEERS)
         controllers = artifacts.read_table(given.controllers, artifacts.CONTROLLERS)
         figures["peers"] = peer_results.peer_strip(peers, runs, cells, controllers)
     for name, figure in figures.items():
