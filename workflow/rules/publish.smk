@@ -13,6 +13,7 @@ rule build_crate:
             FORMATTED_TABLES,
             NOTEBOOKS,
             MEDIA,
+            PEERS,
             "results/check.txt",
             "report/report.html",
         ],
