@@ -112,6 +112,13 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
         assert "train_peer" not in jobs
     made = [name for name in report if name.startswith(("figures/figure_", "results/tables/", "results/notebooks/"))]
     _touch(tmp_path, made)  # only what shows the peers is made
-    _snakemake(tmp_path, "--allowed-rules", "plot_further", "build_reference_report")
+    other = tmp_path / "seeds.yaml"
+    other.write_text("seeds: 77\n")
+    rules = ["judge_claims", "plot_further", "build_reference_report"]
+    _snakemake(tmp_path, "--configfile", other, "--forcerun", "judge_claims", "--allowed-rules", *rules)
+    claims = artifacts.read_table(tmp_path / "results" / "claims.csv", artifacts.CLAIMS).set_index("id")
+    assert claims.loc["C19", "verdict"] != "untestable"
     assert (tmp_path / "figures" / "peers.svg").exists()
-    assert "TD3 100K (3 seeds)" in (tmp_path / "report" / "reference.html").read_text(encoding="utf-8")
+    report = (tmp_path / "report" / "reference.html").read_text(encoding="utf-8")
+    assert "TD3 100K (3 seeds)" in report
+    assert artifacts.read_json(KEPT / "manifest.json")["settings_hash"] in report, "of the run, not of the config now"

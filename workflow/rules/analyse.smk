@@ -140,7 +140,7 @@ rule judge_claims:
         **PUBLISHED,
         runs="results/runs.parquet",
         long_episodes="results/long_episodes.parquet",
-        peers=[path for path in ["results/peers.parquet"] if Path(path).exists()],
+        peers=PEERS,
         ledger=source("report/claims.yaml"),
     output:
         claims="results/claims.csv",

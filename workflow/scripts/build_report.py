@@ -15,9 +15,15 @@ manifests = [given.manifests] if isinstance(given.manifests, str) else given.man
 
 with logged(snakemake.log[0]):
     records = [artifacts.read_json(path) for path in manifests]
+    # The reference run brings its own settings: config.yaml may ask for another study by now.
+    told = (
+        records[0]
+        if "study" in records[0]
+        else {"study": json.loads(params.study), "settings_hash": params.settings_hash}
+    )
     inputs = report.Inputs(
-        study=json.loads(params.study),
-        settings_hash=params.settings_hash,
+        study=told["study"],
+        settings_hash=told["settings_hash"],
         cells=artifacts.read_table(given.cells, artifacts.CELLS),
         runs=artifacts.read_table(given.runs, artifacts.RUNS),
         correlation=artifacts.read_table(given.correlation, artifacts.CORRELATION),

@@ -15,7 +15,7 @@ with logged(snakemake.log[0]):
     ledger = yaml.safe_load(Path(given.ledger).read_text(encoding="utf-8"))
     published = tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     long = artifacts.read_table(given.long_episodes, artifacts.ALL_LONG_EPISODES)
-    peers = artifacts.read_table(given.peers, artifacts.PEERS) if given.peers else None
+    peers = artifacts.read_table(given.peers[0], artifacts.PEERS) if given.peers else None
     measured = claims.measure(runs, snakemake.params.root_seed, peers=peers, long_episodes=long)
     parts = claims.assess(ledger, measured, claims.published_estimates(published))
     artifacts.write_table(snakemake.output.parts, parts, artifacts.CLAIM_PARTS)
