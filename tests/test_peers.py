@@ -12,7 +12,7 @@ import pytest
 import synthetic
 from cells import cell
 
-from reacher_shaping import artifacts, peers
+from reacher_shaping import artifacts, meter, peers
 from reacher_shaping.config import Evaluation
 from reacher_shaping.streams import Purpose, stream
 
@@ -55,6 +55,14 @@ def test_deterministic_evaluation_equals_stepping_gymnasium():
     assert run["deterministic_mean_return"] == pytest.approx(np.mean(returns), rel=1e-5)
     assert run["deterministic_success_rate"] == np.mean(hits)
     assert (run["algorithm"], run["seed"], run["budget"]) == ("td3", 5, 120)
+
+
+def test_training_tells_speed_and_time_left(monkeypatch):
+    monkeypatch.setattr(meter, "SECONDS_PER_REPORT", 0.0)
+    said = []
+    peers.train("ppo", 0, 4000, cell("none", rollout_steps=500, minibatch_size=50).protocol, said.append)
+    assert [line.split(",")[0] for line in said] == [f"thousand steps {done}/4" for done in (1, 2, 3, 4)]
+    assert said[-1].endswith("0.0 min left")
 
 
 def test_runs_fit_their_table(tmp_path):

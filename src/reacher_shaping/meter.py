@@ -12,12 +12,13 @@ class Meter:
     """Speed and time left of a training, said every `SECONDS_PER_REPORT`.
 
     total: iterations of the run; steps: environment steps of one iteration over all seeds; start: iterations that
-    were done before.
+    were done before; unit: what an iteration is called.
     """
 
     total: int
     steps: int
     start: int = 0
+    unit: str = "iteration"
     begun: float = field(default_factory=time.monotonic)
     said: float = field(default_factory=time.monotonic)
 
@@ -29,4 +30,4 @@ class Meter:
         self.said = now
         rate = (iteration - self.start) / max(now - self.begun, 1e-9)
         left = (self.total - iteration) / rate
-        yield f"iteration {iteration}/{self.total}, {rate * self.steps:,.0f} steps/s, {left / 60:.1f} min left"
+        yield f"{self.unit} {iteration}/{self.total}, {rate * self.steps:,.0f} steps/s, {left / 60:.1f} min left"

@@ -4,6 +4,8 @@ Library defaults for SAC and TD3, the protocol's hyperparameters for PPO, no sha
 by this project's own lanes, on the resets that every other policy meets.
 """
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -15,19 +17,37 @@ from numpy.typing import NDArray
 from reacher_shaping.aggregate import evaluation_metrics
 from reacher_shaping.config import Evaluation, Protocol
 from reacher_shaping.evaluate import Actor, evaluate
+from reacher_shaping.meter import Meter
+
+Report = Callable[[str], None]
 
 MODES = ("stochastic", "deterministic")
 
 
-def train(algorithm: str, seed: int, budget: int, protocol: Protocol) -> Any:
-    """Train one Stable-Baselines3 model ("ppo", "sac" or "td3") for `budget` environment steps and return it."""
+STEPS_PER_LOOK = 1000
+"""Environment steps between two looks at the clock, which decides whether there is something to report."""
+
+
+def train(algorithm: str, seed: int, budget: int, protocol: Protocol, report: Report = print) -> Any:
+    """Train one Stable-Baselines3 model ("ppo", "sac" or "td3") for `budget` environment steps and return it.
+
+    `report` gets a line on speed and time left now and then.
+    """
     import stable_baselines3  # here, since it is heavy and used by this optional target alone
 
     torch.set_num_threads(1)
     environment = gymnasium.make("Reacher-v5", reward_control_weight=protocol.environment.control_weight)
     make = {"ppo": stable_baselines3.PPO, "sac": stable_baselines3.SAC, "td3": stable_baselines3.TD3}[algorithm]
     model = make("MlpPolicy", environment, seed=seed, device="cpu", **_settings(algorithm, protocol))
-    return model.learn(budget)
+    meter = Meter(math.ceil(budget / STEPS_PER_LOOK), STEPS_PER_LOOK, unit="thousand steps")
+
+    def look(given: dict[str, Any], _: dict[str, Any]) -> bool:
+        done, rest = divmod(given["self"].num_timesteps, STEPS_PER_LOOK)
+        for line in meter.lines(done) if not rest and done <= meter.total else ():  # PPO's last rollout overshoots
+            report(line)
+        return True
+
+    return model.learn(budget, callback=look)
 
 
 def _settings(algorithm: str, protocol: Protocol) -> dict[str, Any]:
@@ -61,10 +81,16 @@ def actor(model: Any, mode: str) -> Actor:
 
 
 def peer_run(
-    algorithm: str, seed: int, budget: int, protocol: Protocol, evaluation: Evaluation, root_seed: int
+    algorithm: str,
+    seed: int,
+    budget: int,
+    protocol: Protocol,
+    evaluation: Evaluation,
+    root_seed: int,
+    report: Report = print,
 ) -> pd.DataFrame:
     """Train and evaluate one peer; one row: algorithm, seed, budget, and the columns of `runs.parquet`'s evaluation."""
-    model = train(algorithm, seed, budget, protocol)
+    model = train(algorithm, seed, budget, protocol, report)
     row: dict[str, Any] = {"algorithm": algorithm, "seed": seed, "budget": budget}
     for mode, prefix in zip(MODES, ("", "deterministic_"), strict=True):
         episodes = evaluate(

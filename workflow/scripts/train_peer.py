@@ -7,7 +7,7 @@ from reacher_shaping.config import Evaluation, Protocol
 
 params, wildcards = snakemake.params, snakemake.wildcards
 
-with logged(snakemake.log[0]):
+with logged(snakemake.log[0]) as say:
     run = peers.peer_run(
         wildcards.algorithm,
         int(wildcards.seed),
@@ -15,5 +15,6 @@ with logged(snakemake.log[0]):
         Protocol.model_validate_json(params.protocol),
         Evaluation.model_validate_json(params.evaluation),
         params.root_seed,
+        say,
     )
     artifacts.write_table(snakemake.output[0], run, artifacts.PEERS)
