@@ -142,6 +142,8 @@ def advantages(recording, rewards, cell):
 def loss(network, settings, observation, action, log_prob, advantage, target):
     """The PPO loss of one minibatch (Schulman et al. 2017, eq. 9)."""
     distribution, value = network(observation)
+    if settings.ratio_pairs == "minibatch":
+        log_prob = log_prob[:, None]  # the released code's axis too many: a matrix of all pairs
     ratio = torch.exp(distribution.log_prob(action).sum(-1) - log_prob)
     clipped = ratio.clamp(1 - settings.clip_range, 1 + settings.clip_range)
     surrogate = torch.min(ratio * advantage, clipped * advantage).mean()

@@ -61,9 +61,12 @@ def minibatch(samples, seed):
     clip=st.floats(0.01, 0.9),
     value=st.floats(0, 2),
     bonus=st.floats(0, 0.5),
+    pairs=st.sampled_from(["sample", "minibatch"]),
 )
-def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, value, bonus):
-    options = PPO(hidden_units=HIDDEN, clip_range=clip, value_coefficient=value, entropy_coefficient=bonus)
+def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, value, bonus, pairs):
+    options = PPO(
+        hidden_units=HIDDEN, clip_range=clip, ratio_pairs=pairs, value_coefficient=value, entropy_coefficient=bonus
+    )
     rows, records = random_problem(key, spread=spread)
     samples = ppo.unpack(records)
     learner = ppo.Learner(rows, options)

@@ -48,6 +48,7 @@ def weight_error(state, of, seed, network):
         small("l2", alpha0=10.0, shaping={"episode_end": "bootstrap"}),
         small("none", environment={"clip_actions": True, "control_weight": 1.0}, entropy_coefficient=0.0),
         small("none", gae_lambda=0.5, discount=0.9, clip_range=0.01, max_gradient_norm=0.05, hidden_units=16),
+        small("l2", environment={"control_weight": 1.0}, ratio_pairs="minibatch", gae_lambda=0.0),
     ],
     ids=[
         "none",
@@ -60,6 +61,7 @@ def weight_error(state, of, seed, network):
         "bootstrap",
         "clip_actions",
         "ppo",
+        "released",
     ],
 )
 def test_three_iterations_equal_the_plain_loop(of):

@@ -69,6 +69,7 @@ class PPO(Settings):
     discount: Annotated[float, Field(gt=0, le=1)] = 0.99
     gae_lambda: Fraction = 0.95
     clip_range: Positive = 0.2
+    ratio_pairs: Literal["sample", "minibatch"] = "sample"
     minibatch_size: Count = 64
     rollout_steps: Annotated[int, Field(ge=2, le=10**6)] = 2048
     epochs: Annotated[int, Field(ge=1, le=1000)] = 10

@@ -5,6 +5,10 @@ The loss of a minibatch of B samples, for each seed on its own:
     L = -mean(min(rho A, clip(rho, 1 - eps, 1 + eps) A)) + c_v mean((V - R)^2) - c_e H
     rho = pi(a|s) / pi_old(a|s),  H = entropy of the Gaussian
 
+With `ratio_pairs: minibatch` every sample's new probability is divided by every sample's old one, and
+the surrogate is averaged over the B x B ratios rho_ij = pi(a_j|s_j) / pi_old(a_i|s_i) with A_j: what an
+old log-probability with one axis too many broadcasts to, as in the paper's released code.
+
 The network has three layers, so its gradient is a dozen lines; writing them out saves autograd's
 bookkeeping, which costs as much as the arithmetic at this size. Tests hold it against autograd and
 against Stable-Baselines3.
@@ -142,12 +146,8 @@ class Learner:
         mean, value = output[:, :ACTION_SIZE], output[:, ACTION_SIZE]
         inverse_std = torch.exp(-log_std)
         deviation = (samples.action - mean).mul_(inverse_std)
-        ratio = log_probability(deviation, log_std).sub_(samples.log_prob).exp_()
-
-        # Where clipping binds, the minimum is the clipped term, which does not depend on the policy.
-        surrogate = ratio * samples.advantage
-        clipped = ratio.clamp_(1 - settings.clip_range, 1 + settings.clip_range).mul_(samples.advantage)
-        d_log_prob = torch.le(surrogate, clipped).mul(surrogate).mul_(-1 / value.shape[1])[:, None]
+        log_prob = log_probability(deviation, log_std)
+        d_log_prob = self._surrogate_gradient(log_prob, samples).mul_(-1 / value.shape[1])[:, None]
 
         gradient = torch.empty_like(output)
         torch.mul(deviation, d_log_prob, out=gradient[:, :ACTION_SIZE]).mul_(inverse_std)
@@ -156,6 +156,20 @@ class Learner:
         d_log_std = deviation.square_().sub_(1).mul_(d_log_prob).sum(-1, keepdim=True)
         torch.sub(d_log_std, settings.entropy_coefficient, out=self._gradients.log_std)
         return gradient
+
+    def _surrogate_gradient(self, log_prob: Tensor, samples: Samples) -> Tensor:
+        """Return B dL_clip/dlog pi(a|s) [S, B] of the clipped surrogate, given log pi(a|s) [S, B]."""
+        clip, advantage = self.settings.clip_range, samples.advantage
+        if self.settings.ratio_pairs == "minibatch":
+            log_ratio, advantage = log_prob[:, None] - samples.log_prob[:, :, None], advantage[:, None]
+        else:
+            log_ratio = log_prob.sub_(samples.log_prob)
+        ratio = log_ratio.exp_()
+        # Where clipping binds, the minimum is the clipped term, which does not depend on the policy.
+        surrogate = ratio * advantage
+        clipped = ratio.clamp_(1 - clip, 1 + clip).mul_(advantage)
+        gradient = torch.le(surrogate, clipped).mul(surrogate)
+        return gradient if gradient.ndim == 2 else gradient.mean(1)
 
     def _backward(self, features: Tensor, output: Tensor) -> None:
         """Propagate dL/doutput [S, 3, B] to the layers; `delta` is dL/d(sum into a tanh)."""
