@@ -82,5 +82,5 @@ peers: $(READY) ## Stable-Baselines3 PPO, SAC and TD3 on the same task (hours), 
 	snakemake --quiet rules
 
 clean: ## removes results, figures, report and build; keeps .venv
-	rm -rf build report/report.html ro-crate-metadata.json .snakemake
+	rm -rf build report/report.html ro-crate-metadata.json .checksums .snakemake
 	find results figures -mindepth 1 ! -name README.md -delete

@@ -3,6 +3,7 @@ import multiprocessing
 import os
 import pickle
 import time
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -89,6 +90,32 @@ def test_damaged_table_is_named_with_its_repair(tmp_path, damage):
     path.write_bytes(damaged(path.read_bytes())[damage])
     with pytest.raises(ArtifactError, match=r"episodes\.parquet: .*; delete it and run snakemake again"):
         artifacts.read_table(path, EPISODES)
+
+
+@pytest.mark.parametrize("name", ["e.csv", "e.parquet"])
+def test_table_that_has_changed_since_it_was_written_is_named(tmp_path, name):
+    path = tmp_path / name
+    artifacts.write_table(path, episodes(), EPISODES)
+    changed = episodes(min_distance=[0.02, 0.3])
+    artifacts.write_table(tmp_path / "other" / name, changed, EPISODES)
+    path.write_bytes((tmp_path / "other" / name).read_bytes())
+    with pytest.raises(ArtifactError, match=rf"{name}: has changed since it was written; delete it"):
+        artifacts.read_table(path, EPISODES)
+    artifacts.write_table(path, changed, EPISODES)
+    assert artifacts.read_table(path, EPISODES)["min_distance"].tolist() == [0.02, 0.3]
+
+
+def test_table_without_a_seal_is_read_by_its_schema_alone(tmp_path):
+    artifacts.write_table(tmp_path / "e.csv", episodes(), EPISODES, sealed=False)
+    assert [path.name for path in tmp_path.iterdir()] == ["e.csv"]
+    assert len(artifacts.read_table(tmp_path / "e.csv", EPISODES)) == 2
+
+
+def test_what_is_no_file_is_never_replaced(tmp_path):
+    for path in (tmp_path, Path("/dev/null")):
+        with pytest.raises(ArtifactError, match="is no file; give the path of a file"):
+            artifacts.write_text(path, "text")
+    assert Path("/dev/null").is_char_device()
 
 
 def test_swapped_table_is_found(tmp_path):

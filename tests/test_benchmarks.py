@@ -64,7 +64,7 @@ def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
     assert (table["value"] > 0).all()
     assert ((table["low"] <= table["value"]) & (table["value"] <= table["high"])).all()
     assert table[["machine", "threads", "versions", "repeats"]].notna().all(axis=None)
-    assert table["must"].notna().sum() == 7
+    assert table["must"].notna().sum() == 9
     text = (tmp_path / "results.md").read_text()
     assert all(name in text for name in table["name"])
     assert "<svg" in (tmp_path / "results.svg").read_text()

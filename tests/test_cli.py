@@ -77,6 +77,25 @@ def test_options_change_what_they_name(ours, capsys):
     assert (rows("--mode", "deterministic")["final_distance"] != usual["final_distance"]).all()
 
 
+def test_out_that_is_no_file_is_refused_before_anything_is_evaluated(ours, tmp_path, capsys):
+    for out in (tmp_path, "/dev/null"):
+        assert cli.main(["evaluate", str(ours), "--episodes", "1000000", "--out", str(out)]) == 1
+        assert capsys.readouterr().err.strip().endswith(f"{out}: is no file; give the path of a file")
+
+
+def test_policy_that_is_not_what_its_training_wrote_is_refused(ours, capsys):
+    other = ours.with_name("other.pt")
+    other.write_bytes(ours.read_bytes())
+    artifacts.write_json(ours.with_name("training.json"), {"outputs": {"policy.pt": artifacts.sha256(ours)}})
+    assert cli.main(["evaluate", str(ours), str(other), "--episodes", "1"]) == 0, "a copy under another name is as good"
+    content = bytearray(ours.read_bytes())
+    content[len(content) // 2] ^= 1
+    ours.write_bytes(content)
+    capsys.readouterr()
+    assert cli.main(["evaluate", str(ours), "--episodes", "1"]) == 1
+    assert "policy.pt: is not the file that" in capsys.readouterr().err
+
+
 def test_out_gets_all_files_in_one_table(ours, released, tmp_path, capsys):
     out = tmp_path / "new" / "results.csv"
     assert cli.main(["evaluate", str(ours), str(released), "--episodes", "2", "--out", str(out)]) == 0

@@ -155,6 +155,8 @@ def test_a_row_changes_the_settings_of_its_cells_only():
         ("variants.l2.potential", "l3", ["variants.l2.potential = 'l3'", "'none', 'l2' or 'l2sq'"]),
         ("variants.l2; rm -rf", {"potential": "l2"}, ["l2; rm -rf", "pattern"]),
         ("variants.l2", None, ["variants.l2 = None", "mapping"]),
+        ("variants.none.potential", "l2", ["potential = 'l2'", "'none'", "baseline"]),
+        ("variants.plain", {"potential": "none"}, ["potential = 'none'", "'plain'", "baseline"]),
         ("lr", 0.1, ["lr = 0.1", "allowed: root_seed, seeds"]),
     ],
 )
@@ -169,7 +171,7 @@ def test_missing_key_is_named():
     assert "evaluation is missing" in refusal({key: value for key, value in DEFAULT.items() if key != "evaluation"})
 
 
-@pytest.mark.parametrize("text", ["", "# nothing", "- a", "7", "a: [", "{}", "\x00"])
+@pytest.mark.parametrize("text", ["", "# nothing", "- a", "7", "a: [", "{}", "\x00", "a: 1\na: 2", "? [a]\n: 1"])
 def test_file_that_is_no_mapping_is_refused_by_name(tmp_path, text):
     path = tmp_path / "config.yaml"
     path.write_text(text)

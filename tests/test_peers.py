@@ -87,6 +87,7 @@ def _snakemake(folder, *arguments):
     command += [*arguments, "--", "report/reference.html"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
+    assert "Runs are missing" not in done.stderr, "the reference run has no runs to make again"
     return done.stdout
 
 

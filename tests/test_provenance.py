@@ -1,6 +1,6 @@
 import pytest
 
-from reacher_shaping import provenance
+from reacher_shaping import artifacts, provenance
 from reacher_shaping.provenance import code_hash, git_state, machine, reachable_code, versions
 
 MODULES = {
@@ -66,6 +66,13 @@ def package(tmp_path, monkeypatch):
     provenance._source.cache_clear()
     yield edited
     provenance._source.cache_clear()
+
+
+def test_file_that_no_manifest_knows_names_the_manifest(tmp_path):
+    (tmp_path / "policy.pt").write_text("weights")
+    artifacts.write_json(tmp_path / "training.json", {"outputs": {"other.pt": "0"}})
+    with pytest.raises(artifacts.ArtifactError, match=r"training\.json: has no checksum of policy\.pt; delete it"):
+        provenance.unchanged(tmp_path / "policy.pt")
 
 
 def test_only_definitions_that_are_reached_count(package):

@@ -31,7 +31,8 @@ def verify(block):
 def test_untouched_files_pass(block):
     code, said = verify(block)
     assert code == 0
-    assert said == [f"The files of 1 seed blocks in {block.parents[4]} are as they were made."]
+    assert said[0].startswith(f"The files of 1 seed blocks in {block.parents[4]} are as they were made; tables")
+    assert "were not checked" in said[0]
 
 
 @pytest.mark.parametrize("name", ["policy.pt", "monitor/0.monitor.csv"])
@@ -50,7 +51,12 @@ def test_a_missing_file_is_named(block):
     assert verify(block) == (1, [f"{block / 'policy.pt'}: is missing; snakemake makes it again"])
 
 
-@pytest.mark.parametrize("content", ["", "{", "[1]", "{}"])
+def test_a_missing_manifest_is_named(block):
+    (block / "manifest.json").unlink()
+    assert verify(block) == (1, [f"{block / 'manifest.json'}: is missing; snakemake makes it again"])
+
+
+@pytest.mark.parametrize("content", ["", "{", "[1]", "{}", '{"outputs": []}'])
 def test_a_damaged_manifest_is_named(block, content):
     (block / "manifest.json").write_text(content)
     code, said = verify(block)
@@ -62,3 +68,4 @@ def test_a_damaged_manifest_is_named(block, content):
 def test_no_results_are_nothing_to_believe(tmp_path):
     done = subprocess.run([sys.executable, SCRIPT, tmp_path], capture_output=True, text=True, check=False)
     assert done.returncode == 1
+    assert done.stdout == f"{tmp_path / 'results'}: holds no seed blocks; run the study first: make reproduce\n"

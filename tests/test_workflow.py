@@ -120,7 +120,7 @@ def test_crate_lists_every_file_of_the_study_and_how_it_came_about(project):
     shipped = {f"report/{part}" for part in ("claims.yaml", "report.html.j2")} | {
         name for name in made if name.startswith(("report/published/", "report/reference/"))
     }
-    kept_out = {name for name in made if name.startswith(("results/logs/", "results/benchmarks/", "results/."))}
+    kept_out = {name for name in made if name.startswith(("results/logs/", "results/benchmarks/")) or "/." in name}
     assert listed == made - shipped - kept_out
     assert crate.dereference("results/runs.parquet")["sha256"] == artifacts.sha256(
         project.folder / "results/runs.parquet"
@@ -161,8 +161,30 @@ def test_changed_file_is_named_and_never_archived(project, tmp_path, name):
         assert done.returncode == 1
         assert name in done.stderr
         assert not (tmp_path / "study.zip").exists()
+        if name == "results/claims.csv":
+            done = project.snakemake("--allowed-rules", "build_report", "build_crate", "--", "report/report.html")
+            assert done.returncode != 0, "no report is made of it"
+            assert f"{name}: has changed since it was written; delete it" in done.stderr
     finally:
         path.write_bytes(content)
+
+
+def test_changed_crate_is_named_and_nothing_is_archived_by_it(project, tmp_path):
+    path = project.folder / "ro-crate-metadata.json"
+    content = path.read_text()
+    try:
+        for old, new in (('"File"', '"Fime"'), ("runs.parquet", "rums.parquet")):
+            path.write_text(content.replace(old, new, 1))
+            for command in (["workflow/verify.py"], ["workflow/archive.py", ".", str(tmp_path / "study.zip")]):
+                done = project.python(*command)
+                assert done.returncode == 1
+                said = (done.stdout + done.stderr).strip()
+                assert (
+                    said
+                    == "ro-crate-metadata.json: has changed since it was written; delete it and run snakemake again"
+                )
+    finally:
+        path.write_text(content)
 
 
 def test_finished_study_has_nothing_to_do(project):

@@ -38,7 +38,11 @@ def main(folder: Path, archive: Path) -> int:
     if found:
         print("\n".join(found), file=sys.stderr)
         return 1
-    count = pack(folder, archive)
+    try:
+        count = pack(folder, archive)
+    except artifacts.ArtifactError as error:
+        print(error, file=sys.stderr)
+        return 1
     print(f"{count} files, {archive.stat().st_size / 1e6:.0f} MB: {archive}")
     return 0
 

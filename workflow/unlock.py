@@ -1,6 +1,6 @@
 """Remove the lock that a killed Snakemake has left in a folder: only when none of its processes works there any more.
 
-    python workflow/unlock.py FOLDER
+    python workflow/unlock.py [FOLDER]
 
 Jobs outlive a killed Snakemake; they are waited for. A Snakemake that is alive keeps its lock.
 Processes of other machines on a shared disk are not seen.
@@ -49,4 +49,4 @@ def is_scheduler(command) -> bool:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else ""))

@@ -124,13 +124,6 @@ CLAIM_PARTS = Table(
     | {"seeds": INTEGER, "rule": TEXT, "verdict": TEXT},
     optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
 )
-COMPARISONS = Table(
-    {"family": TEXT, "metric": TEXT, **_CELL, "other_variant": TEXT, "other_budget": INTEGER, "other_alpha0": NUMBER}
-    | {"seeds": INTEGER},
-    measures=True,
-)
-LOTTERY = Table({"protocol": TEXT, "statement": TEXT, "share": NUMBER}, optional=frozenset({"share"}))
-RADIUS = Table({**_CELL, "mode": TEXT, "radius": NUMBER, "seeds": INTEGER}, measures=True)
 CONTROLLERS = Table({"protocol": TEXT, "controller": TEXT, "mode": TEXT, "episodes": INTEGER}, measures=True)
 _LENGTH = {"seed": INTEGER, "mode": TEXT, "steps": INTEGER, "episodes": INTEGER}
 LONG_EPISODES = Table(_LENGTH, measures=True)
@@ -150,10 +143,18 @@ WINNERS = Table({"variant": TEXT, "budget": INTEGER, "alpha0": NUMBER, "share": 
 SPREAD = Table({"quantity": TEXT}, measures=True)
 
 
+def require_replaceable(path: Path | str) -> None:
+    """Raise ArtifactError if something other than a file is at `path`: a folder, or a device such as /dev/null."""
+    path = Path(path)
+    if path.exists() and not path.is_file():
+        raise ArtifactError(path, "is no file", "give the path of a file")
+
+
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
     """Give a temporary path beside `path`; put what was written there in place of `path` if nothing was raised."""
     path = Path(path)
+    require_replaceable(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
     os.close(handle)
@@ -210,20 +211,42 @@ def read_json(path: Path | str) -> dict[str, Any]:
     return content
 
 
-def write_table(path: Path | str, frame: pd.DataFrame, table: Table) -> None:
-    """Write a table as parquet or CSV, by the path's suffix. Raises ValueError where it does not fit its schema."""
+def seal(path: Path | str) -> None:
+    """Keep the checksum of a file that was just written, in a hidden folder beside it."""
+    write_text(_seal_of(Path(path)), sha256(path) + "\n")
+
+
+def check_seal(path: Path | str) -> None:
+    """Raise ArtifactError if a file is not as it was when it was sealed; one that never was passes."""
+    kept = _seal_of(Path(path))
+    if kept.exists() and kept.read_text(encoding="utf-8", errors="replace").strip() != sha256(path):
+        raise ArtifactError(path, "has changed since it was written")
+
+
+def _seal_of(path: Path) -> Path:
+    return path.parent / ".checksums" / path.name
+
+
+def write_table(path: Path | str, frame: pd.DataFrame, table: Table, *, sealed: bool = True) -> None:
+    """Write a table as parquet or CSV, by the path's suffix, and seal it unless told otherwise.
+
+    Raises ValueError where it does not fit its schema.
+    """
     path = Path(path)
     arrow = _to_arrow(frame, table, path)
     if path.suffix == ".csv":
         write_text(path, arrow.to_pandas(types_mapper=_nullable).to_csv(index=False, lineterminator="\n"))
-        return
-    with replacing(path) as temporary:
-        pq.write_table(arrow, temporary, compression="zstd", write_page_checksum=True)
+    else:
+        with replacing(path) as temporary:
+            pq.write_table(arrow, temporary, compression="zstd", write_page_checksum=True)
+    if sealed:
+        seal(path)
 
 
 def read_table(path: Path | str, table: Table) -> pd.DataFrame:
     """Read a table; missing values, also of integers, come as NaN. Raises ArtifactError."""
     path = Path(path)
+    check_seal(path)
     try:
         if path.suffix == ".csv":
             frame = pd.read_csv(path, keep_default_na=False, na_values=[""])

@@ -136,11 +136,13 @@ def _evaluate(options: argparse.Namespace) -> None:
     import pandas as pd
     import torch
 
-    from reacher_shaping.artifacts import write_text
+    from reacher_shaping.artifacts import require_replaceable, write_text
     from reacher_shaping.evaluate import evaluate
     from reacher_shaping.policy_files import load_policies
 
     torch.set_num_threads(1)
+    if options.out is not None:
+        require_replaceable(options.out)
     files = [(path, load_policies(path)) for path in options.paths]  # all of them first: a wrong one costs no wait
     tables = []
     for path, trained in files:

@@ -117,6 +117,11 @@ class Variant(Settings):
             raise ValueError("horizon is missing; schedule = 'linear' needs a number of environment steps >= 1")
         if self.schedule == "constant" and self.horizon is not None:
             raise ValueError(f"horizon = {self.horizon} has no meaning with schedule = 'constant'; leave it out")
+        if (self.name == "none") != (self.potential == "none"):
+            raise ValueError(
+                f"potential = {self.potential!r} does not go with the name {self.name!r}: "
+                "the baseline alone is called none and has the potential none"
+            )
         if self.potential == "none" and self.schedule != "constant":
             raise ValueError(
                 f"schedule = {self.schedule!r} has no meaning with potential = 'none'; allowed: 'constant'"
@@ -303,10 +308,23 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
         raise ConfigError(f"{name}: {_flat(_one_line(error))}") from None
 
 
+class _UniqueKeys(yaml.SafeLoader):
+    """YAML in which no key of a mapping is there twice; plain YAML would take the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key, _ in node.value:
+            name = str(key.value)
+            if name in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"the key {name!r} is there twice", key.start_mark)
+            seen.add(name)
+        return super().construct_mapping(node, deep)
+
+
 def require_mapping(path: Path | str) -> Mapping[str, Any]:
     """Read a YAML file that must hold a mapping with at least one key. Raises ConfigError."""
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        content = yaml.load(Path(path).read_text(encoding="utf-8"), _UniqueKeys)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise ConfigError(f"{path}: cannot be read as YAML: {_flat(error)}") from None
     if not content:

@@ -86,8 +86,21 @@ def describe(
     return content
 
 
+def read_manifest(path: Path | str) -> dict[str, Any]:
+    """Read a block's manifest. Raises ArtifactError if it lacks what a crate tells of it."""
+    manifest = artifacts.read_json(path)
+    evaluation = manifest.get("evaluation")
+    missing = [name for name in ("started", "versions", "machine", "git") if name not in manifest]
+    if not isinstance(evaluation, Mapping) or "finished" not in evaluation:
+        missing.append("evaluation.finished")
+    if missing:
+        raise artifacts.ArtifactError(path, f"has no {missing[0]}")
+    return manifest
+
+
 def checksums(path: Path) -> dict[str, str]:
     """Return file name -> SHA-256 as a crate's metadata file says. Raises ArtifactError if it is none."""
+    artifacts.check_seal(path)
     graph = artifacts.read_json(path).get("@graph")
     try:
         found = {entity["@id"]: entity["sha256"] for entity in graph if entity["@type"] == "File"}  # type: ignore[union-attr]

@@ -11,6 +11,7 @@ import torch
 from reacher_shaping.artifacts import ArtifactError, load_tensors, read_policy
 from reacher_shaping.config import Cell, Environment
 from reacher_shaping.policy import Policy
+from reacher_shaping.provenance import recorded_checksum, unchanged
 
 RELEASED = Environment(control_weight=1.0)
 """The reward that the released code's runs were trained and evaluated on, whatever the paper's text says."""
@@ -41,8 +42,10 @@ def load_policies(path: Path | str) -> Trained:
     """Read a `policy.pt` of this project, or one state dict in the layout of the released code.
 
     Raises ArtifactError, one line that names the file, for anything else: no such file, pickled code, a tensor
-    missing, of a wrong shape or not finite.
+    missing, of a wrong shape or not finite, or another content than the manifest beside the file says.
     """
+    if recorded_checksum(path):  # it still lies where its training put it
+        unchanged(path)
     content = load_tensors(path)
     ours = "format" in content and "weights" in content
     try:

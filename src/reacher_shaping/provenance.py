@@ -97,19 +97,32 @@ def machine() -> dict[str, Any]:
     return {"cpu": _cpu(), "cores": len(os.sched_getaffinity(0)), "system": f"{platform.system()} {platform.release()}"}
 
 
+def recorded_checksum(path: Path | str) -> tuple[str, Path] | None:
+    """Return the checksum of a block's file by the manifest beside it, and that manifest; None if none tells.
+
+    Raises ArtifactError for a manifest that cannot be read.
+    """
+    path = Path(path)
+    for manifest in (path.parent / "training.json", path.parent / "manifest.json"):
+        outputs = artifacts.read_json(manifest).get("outputs") if manifest.exists() else None
+        if isinstance(outputs, Mapping) and path.name in outputs:
+            return str(outputs[path.name]), manifest
+    return None
+
+
 def unchanged(path: Path | str) -> Path:
     """Return the path of a block's file if its content is what its job wrote, by the checksum beside it.
 
     Raises ArtifactError that names the file that has changed, or the manifest that cannot tell.
     """
     path = Path(path)
-    for manifest in (path.parent / "training.json", path.parent / "manifest.json"):
-        outputs = artifacts.read_json(manifest).get("outputs")
-        if isinstance(outputs, Mapping) and path.name in outputs:
-            if artifacts.sha256(path) != outputs[path.name]:
-                raise artifacts.ArtifactError(path, f"is not the file that {manifest} has the checksum of")
-            return path
-    raise artifacts.ArtifactError(manifest, f"has no checksum of {path.name}")
+    recorded = recorded_checksum(path)
+    if recorded is None:
+        raise artifacts.ArtifactError(path.parent / "training.json", f"has no checksum of {path.name}")
+    checksum, manifest = recorded
+    if artifacts.sha256(path) != checksum:
+        raise artifacts.ArtifactError(path, f"is not the file that {manifest} has the checksum of")
+    return path
 
 
 @dataclass

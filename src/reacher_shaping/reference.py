@@ -51,7 +51,7 @@ def keep_tables(results: Path, kept: Path) -> None:
         if name in OPTIONAL and not (results / name).exists():
             (kept / name).unlink(missing_ok=True)
             continue
-        artifacts.write_table(kept / name, artifacts.read_table(results / name, table), table)
+        artifacts.write_table(kept / name, artifacts.read_table(results / name, table), table, sealed=False)
 
 
 def compare(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:

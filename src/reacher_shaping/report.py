@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping import answers, captions, peer_results, precision, tables
+from reacher_shaping.config import plain
 from reacher_shaping.grids import Grid, controllers_grid, of_table, settings_grid, study_grid
 from reacher_shaping.style import cell_order, of_protocol, setting_label, variant_label
 
@@ -165,7 +166,7 @@ def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
     chosen = {path.stem: path for path in sorted(inputs.media, key=lambda path: path.suffix != ".gif")}
     shown, left = [], MEDIA_BUDGET
     for row in sorted(cells.to_dict("records"), key=cell_order):
-        stem = f"{row['protocol']}-{row['variant']}-{row['budget']}-alpha{row['alpha0']:g}"
+        stem = f"{row['protocol']}-{row['variant']}-{row['budget']}-alpha{plain(row['alpha0'])}"
         path = chosen.pop(stem, None)
         if path is None:
             continue

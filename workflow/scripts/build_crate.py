@@ -23,8 +23,9 @@ with logged(snakemake.log[0]):
     found = crate.describe(
         [*set(files(given.files)), settings],
         settings=settings,
-        manifests=[artifacts.read_json(path) for path in given.manifests],
+        manifests=[crate.read_manifest(path) for path in given.manifests],
         name="Reward shaping for PPO on Reacher-v5",
         description=f"A run of the reacher-shaping study with {params.cells} cells of {params.seeds} seeds.",
     )
     artifacts.write_json(output.crate, found)
+    artifacts.seal(output.crate)
