@@ -27,6 +27,13 @@ class Project:
         config = yaml.safe_load((folder / "config.yaml").read_text()) | changes
         (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
 
+    def copied(self, folder: Path) -> "Project":
+        """A copy of all that is there by now."""
+        shutil.copytree(self.folder, folder)
+        project = object.__new__(Project)
+        project.folder = folder
+        return project
+
     def start(self, *arguments: str) -> subprocess.Popen:
         """Start Python on the copy, in a process group of its own."""
         environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}

@@ -42,7 +42,7 @@ def made(project: Project) -> dict[str, str]:
     """Checksums of what a study computes: all its files but those that tell times."""
     results = project.folder / "results"
     files = [path for path in results.rglob("*") if path.is_file() and path.suffix in {".pt", ".parquet", ".csv"}]
-    return {str(path.relative_to(results)): artifacts.sha256(path) for path in files}
+    return {str(path.relative_to(results)): artifacts.sha256(path) for path in files if "/." not in str(path)}
 
 
 def reproduce(project: Project) -> subprocess.CompletedProcess:

@@ -161,12 +161,18 @@ def test_changed_file_is_named_and_never_archived(project, tmp_path, name):
         assert done.returncode == 1
         assert name in done.stderr
         assert not (tmp_path / "study.zip").exists()
-        if name == "results/claims.csv":
-            done = project.snakemake("--allowed-rules", "build_report", "build_crate", "--", "report/report.html")
-            assert done.returncode != 0, "no report is made of it"
-            assert f"{name}: has changed since it was written; delete it" in done.stderr
     finally:
         path.write_bytes(content)
+
+
+def test_no_report_is_made_of_a_changed_table(project, tmp_path):
+    copy = project.copied(tmp_path / "copy")
+    table = copy.folder / "results/claims.csv"
+    table.write_text(table.read_text().replace("untestable", "reproduced", 1))
+    done = copy.snakemake("--allowed-rules", "build_report", "build_crate", "--", "report/report.html")
+    assert done.returncode != 0
+    assert "results/claims.csv: has changed since it was written; delete it and run" in done.stderr
+    assert not (copy.folder / "report/report.html").exists()
 
 
 def test_changed_crate_is_named_and_nothing_is_archived_by_it(project, tmp_path):
@@ -179,10 +185,7 @@ def test_changed_crate_is_named_and_nothing_is_archived_by_it(project, tmp_path)
                 done = project.python(*command)
                 assert done.returncode == 1
                 said = (done.stdout + done.stderr).strip()
-                assert (
-                    said
-                    == "ro-crate-metadata.json: has changed since it was written; delete it and run snakemake again"
-                )
+                assert said.startswith("ro-crate-metadata.json: has changed since it was written; delete it and run")
     finally:
         path.write_text(content)
 

@@ -12,9 +12,9 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 
 def files(paths: Iterable[str]) -> Iterator[Path]:
-    """The files among paths and in the folders among them."""
+    """The files among paths and in the folders among them, less the hidden ones that Snakemake puts there."""
     for path in map(Path, paths):
-        yield from (part for part in path.rglob("*") if part.is_file()) if path.is_dir() else [path]
+        yield from (part for part in path.rglob("[!.]*") if part.is_file()) if path.is_dir() else [path]
 
 
 with logged(snakemake.log[0]):
