@@ -3,8 +3,6 @@
 python workflow/keep_reference.py
 """
 
-import hashlib
-import json
 import shutil
 import sys
 from pathlib import Path
@@ -12,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from reacher_shaping import artifacts, reference, tables
-from reacher_shaping.config import block_name, load_study, require_mapping
+from reacher_shaping.config import block_name, load_study, require_mapping, settings_hash
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
@@ -25,8 +23,7 @@ def main() -> None:
     blocks = [artifacts.read_json(folder / "manifest.json") for folder in folders]
     reference.keep_tables(RESULTS, KEPT)
     settings = study.model_dump(mode="json")
-    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
-    record = reference.manifest(settings, digest, blocks)
+    record = reference.manifest(settings, settings_hash(study), blocks)
     artifacts.write_json(KEPT / "manifest.json", record)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 

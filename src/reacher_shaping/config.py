@@ -6,6 +6,8 @@ numpy, so that Snakemake builds its graph of jobs fast.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from collections.abc import Mapping
 from decimal import Decimal
@@ -293,6 +295,12 @@ class Study(Settings):
 def block_name(seeds: range) -> str:
     """Folder of one seed block, e.g. `seeds0-9`."""
     return f"seeds{seeds[0]}-{seeds[-1]}"
+
+
+def settings_hash(study: Study) -> str:
+    """Return the SHA-256 of all settings of a study, as hexadecimal text."""
+    settings = json.dumps(study.model_dump(mode="json"), sort_keys=True)
+    return hashlib.sha256(settings.encode()).hexdigest()
 
 
 def load_study(source: Mapping[str, Any] | Path | str) -> Study:

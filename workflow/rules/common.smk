@@ -1,5 +1,4 @@
 # Functions that several stages share.
-import hashlib
 import json
 import os
 import sys
@@ -26,10 +25,6 @@ def source(path):
 def code(script):
     """Hash of the code a script runs: a param, so that an edit of that code and nothing else reruns its jobs."""
     return code_hash(HERE / "workflow/scripts" / f"{script}.py")
-
-
-def settings_hash(study):
-    return hashlib.sha256(as_json(study.model_dump(mode="json")).encode()).hexdigest()
 
 
 def as_json(settings):
