@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from reacher_shaping import artifacts, cli
-from reacher_shaping.config import Cell, Environment, Protocol, Variant
+from reacher_shaping.config import PPO, Cell, Environment, Protocol, Variant
 from reacher_shaping.evaluate import evaluate
 from reacher_shaping.policy import Policy, initialise
 
@@ -16,7 +16,7 @@ COLUMNS = ["run", "seed", "mean_return", "success_rate", "final_success_rate", "
 
 @pytest.fixture(scope="module")
 def policy():
-    return Policy(initialise([5, 6], 9, 8), 8)
+    return Policy(initialise([5, 6], 9, PPO(hidden_units=8)), 8)
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def test_default_grid_is_the_papers_17_and_6_cells():
 
 
 def test_default_protocol_is_that_of_the_text():
-    assert load_study(DEFAULT).protocols == {"paper": Protocol(name="paper")}
+    assert load_study(DEFAULT).protocols["paper"] == Protocol(name="paper")
 
 
 def test_default_study_evaluates_1000_episodes_within_2_cm():

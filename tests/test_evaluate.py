@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from stable_baselines3.common.monitor import Monitor
 
+from reacher_shaping.config import PPO
 from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.policy import Policy, initialise, layers
 from reacher_shaping.streams import Purpose, stream
@@ -16,7 +17,7 @@ SETTINGS = {"radius": RADIUS, "control_weight": WEIGHT, "root_seed": ROOT}
 
 @pytest.fixture(scope="module")
 def policy():
-    rows = initialise([0, 1], 3, 64)
+    rows = initialise([0, 1], 3, PPO(hidden_units=64))
     layers(rows, 64).log_std.fill_(-0.5)
     return Policy(rows, 64)
 

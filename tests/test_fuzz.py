@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from reacher_shaping import artifacts, jobs
 from reacher_shaping.artifacts import ArtifactError
-from reacher_shaping.config import ConfigError, Study, load_study
+from reacher_shaping.config import PPO, ConfigError, Study, load_study
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.policy_files import load_policies
 from reacher_shaping.train import train
@@ -142,7 +142,7 @@ def stored(tmp_path_factory) -> Path:
     cell = small("l2", iterations=2)
     *_, state = train(cell, [0, 1], radius=0.02)
     jobs.save_checkpoint(folder / "checkpoint.pt", state)
-    policy = Policy(initialise([0, 1], 0, 64), 64)
+    policy = Policy(initialise([0, 1], 0, PPO(hidden_units=64)), 64)
     artifacts.write_policy(folder / "policy.pt", [0, 1], policy.weights(), {"cell": cell.settings()})
     artifacts.write_table(folder / "progress.parquet", state.progress_frame(), artifacts.PROGRESS)
     return folder
@@ -201,7 +201,7 @@ def test_damaged_table_is_refused_or_read_as_it_was(stored, damage):
 )
 def test_made_up_policy_is_refused(content, whole):
     """Valid torch files whose dict holds anything; with `whole`, the rest of it is as it should be."""
-    policy = Policy(initialise([0], 0, 64), 64)
+    policy = Policy(initialise([0], 0, PPO(hidden_units=64)), 64)
     base = {"format": 1, "seeds": [0], "weights": policy.weights(), "settings": json.dumps({"cell": {}})}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.pt"

@@ -7,6 +7,7 @@ import pytest
 import torch
 from plain_loop import Network
 
+from reacher_shaping.config import PPO
 from reacher_shaping.policy import ALIGNMENT, Policy, forward, initialise, inputs, layers, parameter_count
 
 SEEDS = [0, 1, 5]
@@ -14,7 +15,7 @@ SEEDS = [0, 1, 5]
 
 @pytest.fixture
 def policy():
-    rows = initialise(SEEDS, 3, 64)
+    rows = initialise(SEEDS, 3, PPO(hidden_units=64))
     policy = Policy(rows, 64)
     policy.layers.log_std.uniform_(-1, 0, generator=torch.Generator().manual_seed(0))
     return policy
@@ -56,7 +57,7 @@ def test_actions_of_a_seed_do_not_depend_on_the_others(policy, lanes):
 
 
 def test_initial_weights_are_uniform_in_the_range_of_torch_linear_and_log_std_is_zero():
-    weights = Policy(initialise(range(20), 0, 64), 64).weights()
+    weights = Policy(initialise(range(20), 0, PPO(hidden_units=64)), 64).weights()
     for name, tensor in weights.items():
         if name == "log_std":
             assert not tensor.any()
@@ -75,15 +76,15 @@ def test_initial_weights_are_uniform_in_the_range_of_torch_linear_and_log_std_is
 
 
 def test_initial_weights_depend_on_seed_and_root_alone():
-    rows = initialise(SEEDS, 3, 64)
-    assert torch.equal(initialise([5, 0], 3, 64), rows[[2, 0]])
-    assert not torch.equal(initialise([5], 4, 64)[0], rows[2])
+    rows = initialise(SEEDS, 3, PPO(hidden_units=64))
+    assert torch.equal(initialise([5, 0], 3, PPO(hidden_units=64)), rows[[2, 0]])
+    assert not torch.equal(initialise([5], 4, PPO(hidden_units=64))[0], rows[2])
     assert not torch.equal(rows[0], rows[1])
 
 
 @pytest.mark.parametrize("hidden", [64, 7])
 def test_weights_round_trip_bit_for_bit(hidden):
-    rows = initialise(SEEDS, 3, hidden)
+    rows = initialise(SEEDS, 3, PPO(hidden_units=hidden))
     layers(rows, hidden).log_std.fill_(-0.25)
     policy = Policy(rows, hidden)
     copy = Policy.from_weights(policy.weights())

@@ -35,7 +35,7 @@ def random_problem(key, *, seeds=3, count=64, hidden=HIDDEN, dtype=torch.float64
     def normal(*shape):
         return torch.randn(*shape, generator=generator, dtype=torch.float64)
 
-    rows = initialise(range(seeds), key, hidden).double()
+    rows = initialise(range(seeds), key, PPO(hidden_units=hidden)).double()
     policy = Policy(rows, hidden)
     policy.layers.log_std[:] = 0.5 * normal(seeds, 2, 1) - 0.5
     features = torch.cat([normal(seeds, count, 10), torch.ones(seeds, count, 1, dtype=torch.float64)], dim=-1)
@@ -210,7 +210,7 @@ def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_ord
     )  # fmt: skip
     networks = [network_of(rows, seed, HIDDEN) for seed in range(3)]
     learner = ppo.Learner(rows, options)
-    learner.update(records, shuffles)
+    learner.update(records, shuffles, options.learning_rate)
     assert learner.adam.steps == 9
     ours = Policy(rows, HIDDEN).weights()
     for seed, network in enumerate(networks):
@@ -232,11 +232,11 @@ def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
     rows, records = random_problem(4, hidden=64, count=128, dtype=torch.float32)
     shuffles = torch.stack([torch.randperm(128).expand(2, 128) for _ in range(3)])
     clean = ppo.Learner(rows.clone(), options)
-    clean.update(records, shuffles)
+    clean.update(records, shuffles, options.learning_rate)
     rows, records = rows.clone(), records.clone()
     (rows if poison == "weights" else records)[1] = math.nan
     learner = ppo.Learner(rows, options)
-    learner.update(records, shuffles)
+    learner.update(records, shuffles, options.learning_rate)
     assert torch.equal(learner.rows[[0, 2]], clean.rows[[0, 2]])
     assert not torch.isfinite(learner.rows[1]).any()
 
@@ -245,7 +245,7 @@ def test_padding_of_the_rows_stays_zero():
     options = PPO()
     rows, records = random_problem(5, hidden=64, dtype=torch.float32)
     learner = ppo.Learner(rows, options)
-    learner.update(records, torch.arange(64).expand(3, 5, 64))
+    learner.update(records, torch.arange(64).expand(3, 5, 64), options.learning_rate)
     used = sum(math.prod(layer.shape[1:]) for layer in learner.network)
     assert used < rows.shape[1]
     assert not rows[:, used:].any()

@@ -82,6 +82,7 @@ _PROGRESS_NUMBERS = (
     "policy_loss",
     "value_loss",
     "explained_variance",
+    "logged_return",
 )
 _EPISODE_NUMBERS = ("episode_return", "reward_distance", "reward_control", "min_distance", "final_distance")
 

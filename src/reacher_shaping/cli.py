@@ -92,7 +92,6 @@ def parser() -> argparse.ArgumentParser:
 
 def _play(options: argparse.Namespace) -> None:
     from reacher_shaping import media, window
-    from reacher_shaping.policy import Policy
     from reacher_shaping.policy_files import load_policies
 
     if options.record is None:
@@ -102,7 +101,7 @@ def _play(options: argparse.Namespace) -> None:
     if seed not in trained.seeds:
         raise ValueError(f"{options.policy}: has no run {seed}; allowed: {', '.join(map(str, trained.seeds))}")
     row = trained.seeds.index(seed)
-    act = Policy(trained.policy.rows[row : row + 1], trained.policy.hidden).act
+    act = trained.policy.only(row).act
     weight = _control_weight(options, trained.environment.control_weight)
     root_seed = trained.root_seed if options.seed is None else options.seed
     clip = trained.environment.clip_actions

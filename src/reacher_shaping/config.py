@@ -27,7 +27,7 @@ from pydantic import (
     model_validator,
 )
 
-RESERVED_FOLDERS = frozenset({"benchmarks", "logs", "media", "notebooks", "peers", "tables"})
+RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "tables"})
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$", max_length=40)]
 Count = Annotated[int, Field(ge=1, le=10**12)]
@@ -68,10 +68,12 @@ class PPO(Settings):
     """Proximal policy optimisation (Schulman et al. 2017); the defaults are the paper's, as in config.yaml."""
 
     learning_rate: Positive = 3e-4
+    learning_rate_schedule: Literal["constant", "linear"] = "constant"
     discount: Annotated[float, Field(gt=0, le=1)] = 0.99
     gae_lambda: Fraction = 0.95
     clip_range: Positive = 0.2
     ratio_pairs: Literal["sample", "minibatch"] = "sample"
+    advantage_normalisation: Literal["rollout", "minibatch"] = "rollout"
     minibatch_size: Count = 64
     rollout_steps: Annotated[int, Field(ge=2, le=10**6)] = 2048
     epochs: Annotated[int, Field(ge=1, le=1000)] = 10
@@ -80,6 +82,14 @@ class PPO(Settings):
     max_gradient_norm: Positive = 0.5
     adam_epsilon: Positive = 1e-8
     hidden_units: Annotated[int, Field(ge=1, le=4096)] = 64
+    networks: Literal["shared", "separate"] = "shared"
+    initialisation: Literal["default", "orthogonal"] = "default"
+    initial_log_std: float = 0.0
+
+    @property
+    def towers(self) -> int:
+        """Trunks of a network: one for policy and value together, or one each."""
+        return 2 if self.networks == "separate" else 1
 
     @model_validator(mode="after")
     def _minibatches_fill_the_rollout(self) -> Self:
@@ -94,6 +104,14 @@ class Shaping(Settings):
     form: Literal["paper", "dynamic"] = "paper"
     episode_end: Literal["terminal", "bootstrap"] = "terminal"
     terminal_potential: Literal["keep", "zero"] = "keep"
+    decay_potential: Literal["variant", "l2sq"] = "variant"
+    alpha0: Literal["weight", "label"] = "weight"
+
+
+class Log(Settings):
+    """What the protocol's own training log shows, in the column `logged_return`; nothing learns from it."""
+
+    episode_return: Literal["unshaped", "released"] = "unshaped"
 
 
 class Protocol(Settings):
@@ -103,6 +121,7 @@ class Protocol(Settings):
     environment: Environment = Environment()
     ppo: PPO = PPO()
     shaping: Shaping = Shaping()
+    log: Log = Log()
 
 
 class Variant(Settings):
@@ -149,7 +168,7 @@ class Cell(Settings):
             raise ValueError(
                 f"budget = {self.budget} is below one rollout; allowed: >= {self.protocol.ppo.rollout_steps}"
             )
-        if self.variant.potential == "none" and self.alpha0 != 1:
+        if self.variant.potential == "none" and self.alpha0 != 1 and self.protocol.shaping.alpha0 == "weight":
             raise ValueError(f"alpha0 = {self.alpha0} has no meaning with variant '{self.variant.name}'; allowed: 1")
         return self
 
@@ -212,9 +231,37 @@ class Row(Settings):
     @model_validator(mode="before")
     @classmethod
     def _lists_to_tuples(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping):
-            return data
-        return {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
+        return {key: _to_tuple(value) for key, value in data.items()} if isinstance(data, Mapping) else data
+
+
+def _to_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Rows = Annotated[tuple[Row, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
+
+
+class Experiment(Settings):
+    """A further study beside the main one, a target of its name: runs per cell, and its own grid."""
+
+    seeds: Annotated[int, Field(ge=1, le=10**5)]
+    grid: Rows
+
+
+class Attribution(Settings):
+    """What each switch between two protocols does: both ends, each switch alone, and all but it.
+
+    `switches` maps a name to the settings it stands for, such as `ppo.learning_rate`.
+    """
+
+    seeds: Annotated[int, Field(ge=1, le=10**5)]
+    start: Name
+    end: Name
+    switches: Annotated[
+        dict[Name, Annotated[tuple[str, ...], BeforeValidator(_to_tuple), Field(min_length=1)]], Field(min_length=1)
+    ]
+    variants: Annotated[tuple[Name, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
+    budget: Count
 
 
 def _named(entries: Any) -> Any:
@@ -235,11 +282,11 @@ class Study(Settings):
     seeds_per_block: Annotated[int, Field(ge=1, le=1000)]
     protocols: Annotated[dict[Name, Protocol], BeforeValidator(_named), Field(min_length=1)]
     variants: Annotated[dict[Name, Variant], BeforeValidator(_named), Field(min_length=1)]
-    grid: Annotated[
-        tuple[Row, ...], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v), Field(min_length=1)
-    ]
+    grid: Rows
     evaluation: Evaluation
     peers: Peers
+    experiments: dict[Name, Experiment] = {}
+    attribution: Attribution | None = None
 
     @model_validator(mode="after")
     def _grid_is_possible(self) -> Self:
@@ -250,46 +297,101 @@ class Study(Settings):
         for name in self.protocols:
             if name in RESERVED_FOLDERS:
                 raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
-        names = [cell.name for cell in self.cells]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"grid: cell {name} is there {names.count(name)} times; allowed: once")
+        known: dict[str, Cell] = {}
+        for where, cells in {"grid": self.cells, **self.experiment_cells}.items():
+            names = [cell.name for cell in cells]
+            for cell in cells:
+                if names.count(cell.name) > 1:
+                    raise ValueError(
+                        f"{where}: cell {cell.name} is there {names.count(cell.name)} times; allowed: once"
+                    )
+                if known.setdefault(cell.folder, cell) != cell:
+                    raise ValueError(
+                        f"experiments.{where}: cell {cell.name} is also elsewhere, with other settings; "
+                        "allowed: the same, or a protocol of another name"
+                    )
         return self
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
-        """The cells in the order of the grid."""
-        return tuple(cell for number, row in enumerate(self.grid) for cell in self._cells_of(number, row))
+        """The cells of the main study, in the order of the grid."""
+        return self._cells_of_rows("grid", self.grid)
 
-    def _cells_of(self, number: int, row: Row) -> list[Cell]:
-        where = f"grid.{number}"
+    @cached_property
+    def experiment_cells(self) -> dict[str, tuple[Cell, ...]]:
+        """The cells of each further study, by its name; some may be another's or the main study's too."""
+        cells = {
+            name: self._cells_of_rows(f"experiments.{name}.grid", own.grid) for name, own in self.experiments.items()
+        }
+        return cells | ({"attribution": self._attribution_cells(self.attribution)} if self.attribution else {})
+
+    def experiment_seeds(self, name: str) -> int:
+        """Runs per cell of a further study."""
+        return self.attribution.seeds if name == "attribution" and self.attribution else self.experiments[name].seeds
+
+    def _attribution_cells(self, spec: Attribution) -> tuple[Cell, ...]:
+        for end in (spec.start, spec.end):
+            if end not in self.protocols:
+                raise ValueError(f"attribution: the protocol {end!r} is unknown; allowed: {', '.join(self.protocols)}")
+        start, end = (self.protocols[name].model_dump() for name in (spec.start, spec.end))
+        protocols = [start, end]
+        for switch, paths in spec.switches.items():
+            for base, other, word in ((start, end, "with"), (end, start, "without")):
+                name = f"{base['name']}_{word}_{switch}"
+                protocols.append(_switched(base, other, paths, f"attribution.switches.{switch}") | {"name": name})
+        return tuple(
+            self._cell(Protocol.model_validate(protocol), variant, spec.budget, 1.0, "attribution")
+            for protocol in protocols
+            for variant in spec.variants
+        )
+
+    def _cell(self, protocol: Protocol, variant: str, budget: int, alpha0: float, where: str) -> Cell:
+        if variant not in self.variants:
+            raise ValueError(f"{where}.variants = {variant!r} is unknown; allowed: {', '.join(self.variants)}")
+        return Cell(
+            protocol=protocol, variant=self.variants[variant], budget=budget, alpha0=alpha0, root_seed=self.root_seed
+        )
+
+    def _cells_of_rows(self, where: str, rows: tuple[Row, ...]) -> tuple[Cell, ...]:
+        return tuple(cell for number, row in enumerate(rows) for cell in self._cells_of(f"{where}.{number}", row))
+
+    def _cells_of(self, where: str, row: Row) -> list[Cell]:
         if row.protocol not in self.protocols:
             raise ValueError(f"{where}.protocol = {row.protocol!r} is unknown; allowed: {', '.join(self.protocols)}")
-        for variant in row.variants:
-            if variant not in self.variants:
-                raise ValueError(f"{where}.variants = {variant!r} is unknown; allowed: {', '.join(self.variants)}")
         protocol = self.protocols[row.protocol].model_dump()
         for part in ("environment", "ppo", "shaping"):
             protocol[part] |= getattr(row, part)
         try:
             changed = Protocol.model_validate(protocol)
             return [
-                Cell(
-                    protocol=changed,
-                    variant=self.variants[variant],
-                    budget=budget,
-                    alpha0=alpha0,
-                    root_seed=self.root_seed,
-                )
+                self._cell(changed, variant, budget, alpha0, where)
                 for variant, budget, alpha0 in product(row.variants, row.budgets, row.alpha0)
             ]
         except ValidationError as error:
             raise ValueError(f"{where}.{_one_line(error)}".replace("..", ".")) from None
 
-    def blocks(self) -> tuple[range, ...]:
-        """Consecutive ranges of run seeds that train together; more seeds leave every full block as it is."""
-        size = self.seeds_per_block
-        return tuple(range(first, min(first + size, self.seeds)) for first in range(0, self.seeds, size))
+    def blocks(self, seeds: int | None = None) -> tuple[range, ...]:
+        """Consecutive ranges of run seeds that train together; more seeds leave every full block as it is.
+
+        `seeds` are the main study's unless told.
+        """
+        count, size = seeds or self.seeds, self.seeds_per_block
+        return tuple(range(first, min(first + size, count)) for first in range(0, count, size))
+
+
+def _switched(base: dict[str, Any], other: Mapping[str, Any], paths: tuple[str, ...], where: str) -> dict[str, Any]:
+    """The settings `base` with those at the dotted `paths` taken from `other`. Raises ValueError."""
+    changed = {part: dict(value) if isinstance(value, Mapping) else value for part, value in base.items()}
+    for path in paths:
+        part, _, key = path.partition(".")
+        if not isinstance(other.get(part), Mapping) or key not in other[part]:
+            raise ValueError(f"{where} = {path!r} is no setting of a protocol; allowed: such as 'ppo.learning_rate'")
+        if other[part][key] == base[part][key]:
+            raise ValueError(
+                f"{where} = {path!r} is {_short(base[part][key])} at both ends; allowed: a setting that differs"
+            )
+        changed[part][key] = other[part][key]
+    return changed
 
 
 def block_name(seeds: range) -> str:

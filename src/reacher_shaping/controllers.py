@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats as distributions
 
+from reacher_shaping.config import PPO
 from reacher_shaping.evaluate import Actor, Mode, evaluate
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.stats import wilson_interval
@@ -60,9 +61,9 @@ def clipped_gaussian(observation: Array, noise: Noise) -> NDArray[np.float32]:
     return _required(noise).clip(-1.0, 1.0)
 
 
-def untrained_network(root_seed: int, hidden: int) -> Actor:
-    """The network of width `hidden` that run seed 0 starts its training from."""
-    return Policy(initialise([0], root_seed, hidden), hidden).act
+def untrained_network(root_seed: int, settings: PPO) -> Actor:
+    """The network that run seed 0 starts its training from."""
+    return Policy(initialise([0], root_seed, settings), settings.hidden_units, settings.towers).act
 
 
 def reach(gains: Gains) -> Actor:
@@ -108,9 +109,15 @@ def tip_position(angles: Array) -> Array:
 
 
 def evaluate_controllers(
-    *, episodes: int, radius: float, control_weight: float, root_seed: int, clip_actions: bool = False, hidden: int = 64
+    *,
+    episodes: int,
+    radius: float,
+    control_weight: float,
+    root_seed: int,
+    clip_actions: bool = False,
+    network: PPO | None = None,
 ) -> pd.DataFrame:
-    """Evaluate all reference policies; the arguments are those of `evaluate.evaluate`.
+    """Evaluate all reference policies; the arguments are those of `evaluate.evaluate`, and the untrained network's.
 
     Returns a row per controller: `controller, mode, episodes, control_weight`, then `success_rate` with its 95 %
     Wilson interval `success_low, success_high`, `mean_return` with its 95 % t interval `mean_return_low,
@@ -123,7 +130,7 @@ def evaluate_controllers(
         ("uniform random", "stochastic", uniform),
         ("unit Gaussian", "stochastic", gaussian),
         ("unit Gaussian, clipped", "stochastic", clipped_gaussian),
-        ("untrained network", "stochastic", untrained_network(root_seed, hidden)),
+        ("untrained network", "stochastic", untrained_network(root_seed, network or PPO())),
         ("inverse kinematics + PD", "deterministic", reach(gains)),
     ]
     rows = []

@@ -74,6 +74,7 @@ def save_checkpoint(path: Path, state: TrainState) -> None:
         "progress": {name: torch.from_numpy(values) for name, values in state.progress.items()},
         "episode_returns": torch.from_numpy(state.episode_returns),
         "rollout_steps": state.rollout_steps,
+        "unlogged": torch.from_numpy(state.unlogged),
     }
     buffer = io.BytesIO()
     torch.save(content, buffer)
@@ -94,6 +95,7 @@ def load_checkpoint(path: Path) -> TrainState:
             progress={name: values.numpy() for name, values in content["progress"].items()},
             episode_returns=content["episode_returns"].numpy(),
             rollout_steps=content["rollout_steps"],
+            unlogged=content["unlogged"].numpy(),
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise artifacts.ArtifactError(path, f"is no checkpoint ({error!r})") from None

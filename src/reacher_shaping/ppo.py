@@ -22,7 +22,7 @@ import torch
 from torch import Tensor
 
 from reacher_shaping.config import PPO
-from reacher_shaping.policy import Layers, forward, layers
+from reacher_shaping.policy import Layers, forward, from_towers, layers, owned, to_towers
 from reacher_shaping.reacher import ACTION_SIZE, OBSERVATION_SIZE
 
 LOG_2PI = math.log(2 * math.pi)
@@ -105,20 +105,22 @@ class Learner:
         self.rows = rows
         self.settings = settings
         self.adam = adam or Adam.zeros_like(rows)
-        self.network = layers(rows, settings.hidden_units)
+        self.network = layers(rows, settings.hidden_units, settings.towers)
         self.gradient = torch.zeros_like(rows)
-        self._gradients = layers(self.gradient, settings.hidden_units)
-        shape = (rows.shape[0], settings.minibatch_size, settings.hidden_units)
+        self._gradients = layers(self.gradient, settings.hidden_units, settings.towers)
+        self._owned = owned(settings.towers).to(rows.dtype)
+        shape = (rows.shape[0] * settings.towers, settings.minibatch_size, settings.hidden_units)
         self._hidden = rows.new_empty(shape), rows.new_empty(shape)
         self._delta = rows.new_empty(shape)
 
     @torch.inference_mode()
-    def update(self, records: Tensor, shuffles: Tensor) -> None:
+    def update(self, records: Tensor, shuffles: Tensor, learning_rate: float) -> None:
         """Run all epochs over the samples of a rollout.
 
         Args:
             records: [S, N, 16], see `pack`.
             shuffles: [S, epochs, N] int64, each seed's own orders of its samples.
+            learning_rate: Adam's, for this rollout.
         """
         seeds, count, width = records.shape
         batch = self.settings.minibatch_size
@@ -127,18 +129,24 @@ class Learner:
             index = (shuffles[:, epoch] + offset).view(seeds, -1, batch).transpose(0, 1)
             shuffled = records.view(-1, width).index_select(0, index.reshape(-1))
             epoch_samples = unpack(shuffled.view(-1, seeds, batch, width))
+            if self.settings.advantage_normalisation == "minibatch":
+                epoch_samples = epoch_samples._replace(advantage=_normalise(epoch_samples.advantage))
             for minibatch in zip(*epoch_samples, strict=True):
                 self.differentiate(Samples(*minibatch))
                 self._clip()
-                self.adam.step(self.rows, self.gradient, self.settings.learning_rate, self.settings.adam_epsilon)
+                self.adam.step(self.rows, self.gradient, learning_rate, self.settings.adam_epsilon)
 
     def differentiate(self, samples: Samples) -> None:
         """Write dL/dparameters of one minibatch [S, B] into `gradient`."""
-        net, (hidden1, hidden2) = self.network, self._hidden
-        torch.bmm(samples.features, net.first, out=hidden1).tanh_()
+        net, (hidden1, hidden2), towers = self.network, self._hidden, self.settings.towers
+        features = to_towers(samples.features, towers)
+        torch.bmm(features, net.first, out=hidden1).tanh_()
         torch.bmm(hidden1, net.second, out=hidden2).add_(net.second_bias).tanh_()
         output = torch.bmm(net.head, hidden2.transpose(1, 2)).add_(net.head_bias)
-        self._backward(samples.features, self._loss_gradient(samples, output))
+        gradient = self._loss_gradient(samples, from_towers(output, towers))
+        if towers > 1:
+            gradient = (gradient[:, None] * self._owned).flatten(0, 1)
+        self._backward(features, gradient)
 
     def _loss_gradient(self, samples: Samples, output: Tensor) -> Tensor:
         """Write dL/dlog_std; return dL/doutput [S, 3, B], the action means and the value."""
@@ -172,7 +180,7 @@ class Learner:
         return gradient if gradient.ndim == 2 else gradient.mean(1)
 
     def _backward(self, features: Tensor, output: Tensor) -> None:
-        """Propagate dL/doutput [S, 3, B] to the layers; `delta` is dL/d(sum into a tanh)."""
+        """Propagate dL/doutput [S K, 3, B] to the layers; `delta` is dL/d(sum into a tanh)."""
         net, gradients, (hidden1, hidden2), delta = self.network, self._gradients, self._hidden, self._delta
         torch.bmm(output, hidden2, out=gradients.head)
         torch.sum(output, -1, keepdim=True, out=gradients.head_bias)
@@ -190,6 +198,12 @@ class Learner:
         """Scale each seed's gradient to a norm of at most `max_gradient_norm` over all parameters."""
         norm = torch.linalg.vector_norm(self.gradient, dim=1, keepdim=True)
         self.gradient.mul_((self.settings.max_gradient_norm / (norm + 1e-6)).clamp_(max=1.0))
+
+
+def _normalise(advantage: Tensor) -> Tensor:
+    """Return advantages [..., B] with mean 0 and unbiased deviation 1 in every minibatch."""
+    centred = advantage - advantage.mean(-1, keepdim=True)
+    return centred / (advantage.std(-1, keepdim=True) + 1e-8)
 
 
 def _tanh_backward(delta: Tensor, output: Tensor) -> None:

@@ -61,8 +61,14 @@ def shaping_reward(
             2012, eq. 3). `terminal_potential` "zero" takes Phi = 0 in the state after a last step,
             which invariance needs if that state's value counts as zero (Grzes 2017); the paper keeps
             it. With "bootstrap" ends the next state's value counts, so its potential is always kept.
+            `decay_potential` "l2sq" gives every decayed variant that potential, and `alpha0` "label" starts
+            every weight at 1, as the code released with the paper does.
     """
-    phi = potential(variant.potential, distance)
+    decays = variant.horizon is not None
+    phi = potential(
+        settings.decay_potential if decays and settings.decay_potential != "variant" else variant.potential, distance
+    )
+    alpha0 = 1.0 if settings.alpha0 == "label" else alpha0
     before, after = phi[..., :-1], phi[..., 1:]
     if settings.terminal_potential == "zero" and settings.episode_end == "terminal":
         after = np.where(ends, 0.0, after)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from reacher_shaping import advantage, ppo, shaping
-from reacher_shaping.config import Cell
+from reacher_shaping.config import PPO, Cell
 from reacher_shaping.policy import Policy, forward, initialise, inputs
 from reacher_shaping.reacher import ACTION_SIZE, EPISODE_STEPS
 from reacher_shaping.rollout import Collector, Plan, Rollout, environment_reward
@@ -38,8 +38,13 @@ MEASURES = (
     "policy_loss",
     "value_loss",
     "explained_variance",
+    "logged_return",
 )
 """The measures of an iteration, in the order of `progress.parquet`."""
+
+
+RELEASED_LOG_EPISODES = 10
+"""Episodes of a rollout, the last ones, that the released code's logged return is the mean of."""
 
 
 @dataclass
@@ -56,6 +61,7 @@ class TrainState:
         progress: [S, I] of each of `MEASURES`, NaN from `iteration` on.
         episode_returns: [S, I, E] unshaped returns of the episodes that reached the time limit.
         rollout_steps: environment steps of an iteration.
+        unlogged: [S] shaped return of the last rollout's steps after its last whole episode.
         iteration: iterations done.
     """
 
@@ -65,21 +71,23 @@ class TrainState:
     progress: Rows
     episode_returns: Array
     rollout_steps: int
+    unlogged: Array
     iteration: int = 0
 
     @classmethod
     def start(cls, cell: Cell, seeds: Sequence[int]) -> "TrainState":
         """Return the state before the first iteration."""
         settings = cell.protocol.ppo
-        rows = initialise(seeds, cell.root_seed, settings.hidden_units)
+        rows = initialise(seeds, cell.root_seed, settings)
         shape = (len(seeds), cell.iterations)
         progress = {name: np.full(shape, np.nan) for name in MEASURES}
         returns = np.full((*shape, Plan(settings.rollout_steps).episodes), np.nan)
-        return cls(tuple(seeds), rows, ppo.Adam.zeros_like(rows), progress, returns, settings.rollout_steps)
+        unlogged = np.zeros(len(seeds))
+        return cls(tuple(seeds), rows, ppo.Adam.zeros_like(rows), progress, returns, settings.rollout_steps, unlogged)
 
     def policy(self, cell: Cell) -> Policy:
         """Return the policy as trained so far."""
-        return Policy(self.rows, cell.protocol.ppo.hidden_units)
+        return Policy(self.rows, cell.protocol.ppo.hidden_units, cell.protocol.ppo.towers)
 
     def diverged(self) -> list[int]:
         """Return the seeds whose parameters are no longer finite."""
@@ -138,18 +146,45 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
     while state.iteration < cell.iterations:
         rollout = collector.collect(policy, state.iteration)
         records, summary = prepare(cell, policy, rollout, plan, state.iteration, radius)
-        learner.update(records, _shuffles(cell, seeds, state.iteration))
+        rate = learning_rate(settings, state.iteration / cell.iterations)
+        learner.update(records, _shuffles(cell, seeds, state.iteration), rate)
         losses = ppo.diagnose(learner.network, records, settings.clip_range)
         measured = {
             **summary,
             "action_std": learner.network.log_std.exp().mean((1, 2)),
             **losses._asdict(),
         }
+        shaped, rest = measured.pop("shaped_returns"), measured.pop("rest")
         state.episode_returns[:, state.iteration] = measured.pop("episode_returns")
+        if cell.protocol.log.episode_return == "released":
+            measured["logged_return"] = released_log(shaped, state.unlogged)
+        else:
+            measured["logged_return"] = measured["episode_return"]
+        state.unlogged = rest
         for name, values in measured.items():
             state.progress[name][:, state.iteration] = values
         state.iteration += 1
         yield state
+
+
+def learning_rate(settings: PPO, done: float) -> float:
+    """Return Adam's learning rate when the share `done` of all iterations is over; "linear" falls to 0 at the end."""
+    return (
+        settings.learning_rate * (1 - done) if settings.learning_rate_schedule == "linear" else settings.learning_rate
+    )
+
+
+def released_log(shaped: Array, unlogged: Array) -> Array:
+    """Return what the code released with the paper logs for an iteration, [S].
+
+    Args:
+        shaped: [S, E] shaped returns of the rollout's whole episodes.
+        unlogged: [S] shaped return of the rollout before, after its last whole episode. The running sum of an
+            episode is not cleared where a rollout starts, so the first episode's contains it.
+    """
+    logged = shaped.copy()
+    logged[:, 0] += unlogged
+    return logged[:, -RELEASED_LOG_EPISODES:].mean(1)
 
 
 def prepare(
@@ -158,7 +193,8 @@ def prepare(
     """Turn a rollout into sample records [S, N, 16] and the rollout's summary, [S] each.
 
     Samples stand in the order of the sequential rollout. The summary also holds `episode_returns`
-    [S, E], unshaped.
+    [S, E], unshaped, `shaped_returns` [S, E], and `rest` [S], the shaped return of the steps after the last
+    whole episode.
     """
     settings = cell.protocol.ppo
     reward = environment_reward(rollout.distance, rollout.control, cell.protocol.environment.control_weight)
@@ -211,14 +247,17 @@ def _outputs(policy: Policy, rollout: Rollout) -> tuple[Tensor, Tensor, Array]:
 
 
 def _summary(reward: Array, extra: Array, rollout: Rollout, plan: Plan, radius: float) -> Rows:
-    """Return the means [S] over a rollout's whole episodes, and `episode_returns` [S, E]."""
+    """Return the means [S] over a rollout's whole episodes, their returns [S, E], and the return of the rest [S]."""
     whole = slice(0, plan.episodes)
     returns = reward[:, whole].sum(-1)
+    shaped = np.where(plan.ends.cumsum(1) - plan.ends, 0.0, reward + extra).sum(-1)
     distance = rollout.distance[:, whole, 1:]
     return {
         "episode_returns": returns,
         "episode_return": returns.mean(1),
-        "shaped_return": (reward + extra)[:, whole].sum(-1).mean(1),
+        "shaped_returns": shaped[:, whole],
+        "rest": shaped[:, plan.episodes :].sum(1),
+        "shaped_return": shaped[:, whole].mean(1),
         "episode_length": np.full(len(returns), float(EPISODE_STEPS)),
         "success_rate": (distance.min(-1) <= radius).mean(1),
         "final_distance": distance[..., -1].mean(1),

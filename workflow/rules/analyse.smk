@@ -18,7 +18,7 @@ TABLES = [
     "results/winners.csv",
     "results/spread.csv",
 ]
-BLOCK_CELLS = [cell.key for cell in STUDY.cells for _ in SEEDS]
+BLOCK_CELLS = block_cells(STUDY.cells, STUDY.seeds)
 PUBLISHED = {
     "table2": source("report/published/table2.csv"),
     "table3": source("report/published/table3.csv"),

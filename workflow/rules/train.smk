@@ -1,9 +1,26 @@
 # From a cell's settings to trained policies: one job per seed block.
 from reacher_shaping.config import block_name
 
-CELLS = {cell.folder: cell for cell in STUDY.cells}
-SEEDS = {block_name(seeds): seeds for seeds in STUDY.blocks()}
-BLOCKS = [f"results/{cell}/{block}" for cell in CELLS for block in SEEDS]
+EXPERIMENTS = STUDY.experiment_cells  # the further studies' cells, see experiments.smk
+CELLS = {cell.folder: cell for cells in [STUDY.cells, *EXPERIMENTS.values()] for cell in cells}
+SEEDS = {
+    block_name(seeds): seeds
+    for count in [STUDY.seeds, *map(STUDY.experiment_seeds, EXPERIMENTS)]
+    for seeds in STUDY.blocks(count)
+}
+
+
+def blocks(cells, seeds):
+    """Folders of the seed blocks of cells: cell by cell, so in the order of `block_cells`."""
+    return [f"results/{cell.folder}/{block_name(block)}" for cell in cells for block in STUDY.blocks(seeds)]
+
+
+def block_cells(cells, seeds):
+    """The cell's key of each of these blocks."""
+    return [cell.key for cell in cells for _ in STUDY.blocks(seeds)]
+
+
+BLOCKS = blocks(STUDY.cells, STUDY.seeds)
 BLOCK_FILES = expand(
     "{block}/{file}",
     block=BLOCKS,

@@ -22,7 +22,7 @@ with logged(snakemake.log[0]):
             radius=evaluation.radius,
             control_weight=protocol.environment.control_weight,
             clip_actions=protocol.environment.clip_actions,
-            hidden=protocol.ppo.hidden_units,
+            network=protocol.ppo,
             root_seed=params.root_seed,
         ).assign(protocol=protocol.name)
         for protocol in protocols
