@@ -1,6 +1,6 @@
 """Cells for the tests of the engine, small where size does not matter."""
 
-from reacher_shaping.config import PPO, Cell, Environment, Protocol, Shaping, Variant
+from reacher_shaping.config import PPO, Cell, Environment, Log, Protocol, Shaping, Variant
 
 VARIANTS = {
     "none": Variant(name="none", potential="none"),
@@ -10,11 +10,15 @@ VARIANTS = {
 }
 
 
-def cell(variant="none", *, iterations=3, alpha0=1.0, root_seed=7, environment=None, shaping=None, **ppo):
+def cell(variant="none", *, iterations=3, alpha0=1.0, root_seed=7, environment=None, shaping=None, log=None, **ppo):
     """A cell of the `paper` protocol, changed where told."""
     settings = PPO(**ppo)
     protocol = Protocol(
-        name="paper", environment=Environment(**(environment or {})), ppo=settings, shaping=Shaping(**(shaping or {}))
+        name="paper",
+        environment=Environment(**(environment or {})),
+        ppo=settings,
+        shaping=Shaping(**(shaping or {})),
+        log=Log(**(log or {})),
     )
     return Cell(
         protocol=protocol,

@@ -15,20 +15,27 @@ from torch.distributions import Normal
 from reacher_shaping.streams import Purpose, stream
 
 
-class Network(nn.Module):
-    """Policy and value on one trunk; parameter names are those of the released code."""
+def trunk(hidden):
+    """Two Tanh layers."""
+    return nn.Sequential(nn.Linear(10, hidden), nn.Tanh(), nn.Linear(hidden, hidden), nn.Tanh())
 
-    def __init__(self, hidden=64):
+
+class Network(nn.Module):
+    """Policy and value on one trunk, or on one each; with one, parameter names are those of the released code."""
+
+    def __init__(self, hidden=64, *, separate=False):
         super().__init__()
         self.log_std = nn.Parameter(torch.zeros(2))
-        self.shared = nn.Sequential(nn.Linear(10, hidden), nn.Tanh(), nn.Linear(hidden, hidden), nn.Tanh())
+        self.trunks = ["policy_trunk", "value_trunk"] if separate else ["shared"]
+        for name in self.trunks:
+            setattr(self, name, trunk(hidden))
         self.policy_mean = nn.Linear(hidden, 2)
         self.value = nn.Linear(hidden, 1)
 
     def forward(self, observation):
         """Return the action distribution [N, 2] and the values [N] of observations [N, 10]."""
-        trunk = self.shared(observation)
-        return Normal(self.policy_mean(trunk), self.log_std.exp()), self.value(trunk).squeeze(-1)
+        policy, value = getattr(self, self.trunks[0])(observation), getattr(self, self.trunks[-1])(observation)
+        return Normal(self.policy_mean(policy), self.log_std.exp()), self.value(value).squeeze(-1)
 
 
 @dataclass
@@ -52,31 +59,45 @@ def make_environment(cell):
 
 
 def initial_network(cell, seed):
-    """PyTorch's default initialisation, uniform in +- 1 / sqrt(inputs), from the seed's stream."""
-    hidden = cell.protocol.ppo.hidden_units
+    """The first weights of a run, from the seed's stream, trunk by trunk with the heads on top of each."""
+    settings = cell.protocol.ppo
     generator = stream(cell.root_seed, Purpose.INITIALISATION, seed)
+    network = Network(settings.hidden_units, separate=settings.networks == "separate")
+    draw = orthogonal if settings.initialisation == "orthogonal" else uniform
+    heads = {"policy_mean": slice(2), "value": slice(2, 3)}
+    for name in network.trunks:
+        first, second, means_and_value = draw(generator, settings.hidden_units)
+        for layer, (weight, bias) in ((getattr(network, name)[0], first), (getattr(network, name)[2], second)):
+            layer.weight.data, layer.bias.data = weight, bias
+        for head in {"policy_trunk": ["policy_mean"], "value_trunk": ["value"]}.get(name, heads):
+            layer, (weight, bias) = getattr(network, head), means_and_value
+            layer.weight.data, layer.bias.data = weight[heads[head]], bias[heads[head]]
+    network.log_std.data.fill_(settings.initial_log_std)
+    return network
 
-    def uniform(inputs, *shape):
+
+def uniform(generator, hidden):
+    """Weights and biases of three layers, uniform in +- 1 / sqrt(inputs): PyTorch's default."""
+
+    def draw(inputs, *shape):
         return torch.from_numpy(generator.uniform(-(inputs**-0.5), inputs**-0.5, size=shape)).float()
 
-    network = Network(hidden)
-    first = uniform(10, 11, hidden)  # ten rows of weights, one of biases
-    second, second_bias = uniform(hidden, hidden, hidden), uniform(hidden, hidden)
-    heads, head_biases = uniform(hidden, 3, hidden), uniform(hidden, 3)
-    network.load_state_dict(
-        {
-            "log_std": torch.zeros(2),
-            "shared.0.weight": first[:10].T,
-            "shared.0.bias": first[10],
-            "shared.2.weight": second.T,
-            "shared.2.bias": second_bias,
-            "policy_mean.weight": heads[:2],
-            "policy_mean.bias": head_biases[:2],
-            "value.weight": heads[2:],
-            "value.bias": head_biases[2:],
-        }
-    )
-    return network
+    first = draw(10, 11, hidden)  # ten rows of weights, one of biases
+    second, second_bias = draw(hidden, hidden, hidden), draw(hidden, hidden)
+    heads, head_biases = draw(hidden, 3, hidden), draw(hidden, 3)
+    return (first[:10].T, first[10]), (second.T, second_bias), (heads, head_biases)
+
+
+def orthogonal(generator, hidden):
+    """Orthogonal weights of three layers as Stable-Baselines3 scales them, biases 0."""
+    random = torch.Generator().manual_seed(int(generator.integers(2**63)))
+
+    def draw(outputs, inputs, gain):
+        return nn.init.orthogonal_(torch.empty(outputs, inputs), gain, random)
+
+    first, second = draw(hidden, 10, 2**0.5), draw(hidden, hidden, 2**0.5)
+    heads = torch.cat([draw(2, hidden, 0.01), draw(1, hidden, 1.0)])
+    return (first, torch.zeros(hidden)), (second, torch.zeros(hidden)), (heads, torch.zeros(3))
 
 
 @torch.no_grad()
@@ -106,11 +127,13 @@ def collect(env, network, cell, seed, iteration):
 def shaped_rewards(recording, cell, iteration):
     """The reward of the environment plus the shaping term, step by step."""
     settings, variant = cell.protocol.shaping, cell.variant
-    potential = {"none": lambda d: 0.0, "l2": lambda d: -d, "l2sq": lambda d: -d * d}[variant.potential]
+    name = "l2sq" if variant.horizon and settings.decay_potential == "l2sq" else variant.potential
+    potential = {"none": lambda d: 0.0, "l2": lambda d: -d, "l2sq": lambda d: -d * d}[name]
     discount = cell.protocol.ppo.discount
+    start = 1.0 if settings.alpha0 == "label" else cell.alpha0
 
     def alpha(t):
-        return cell.alpha0 if variant.horizon is None else cell.alpha0 * max(0.0, 1 - t / variant.horizon)
+        return start if variant.horizon is None else start * max(0.0, 1 - t / variant.horizon)
 
     rewards = []
     for n, reward in enumerate(recording.reward):
@@ -159,13 +182,36 @@ def update(network, optimizer, cell, seed, iteration, recording, advantage):
     arrays = (recording.observation, recording.action, recording.log_prob, normalised, advantage + recording.value)
     samples = [torch.from_numpy(array).float() for array in arrays]
     shuffles = stream(cell.root_seed, Purpose.SHUFFLES, seed, iteration)
+    done = iteration / cell.iterations
+    for group in optimizer.param_groups:
+        group["lr"] = settings.learning_rate * ((1 - done) if settings.learning_rate_schedule == "linear" else 1)
     for _ in range(settings.epochs):
         order = torch.from_numpy(shuffles.permuted(np.arange(settings.rollout_steps)))
         for minibatch in order.split(settings.minibatch_size):
             optimizer.zero_grad()
-            loss(network, settings, *(sample[minibatch] for sample in samples)).backward()
+            chosen = [sample[minibatch] for sample in samples]
+            if settings.advantage_normalisation == "minibatch":
+                chosen[3] = (chosen[3] - chosen[3].mean()) / (chosen[3].std() + 1e-8)
+            loss(network, settings, *chosen).backward()
             nn.utils.clip_grad_norm_(network.parameters(), settings.max_gradient_norm)
             optimizer.step()
+
+
+def released_log(cell, recordings):
+    """The figure that the released code logs for the last of a run's rollouts, from all of them.
+
+    One running sum of shaped rewards, put on a list and cleared where an episode is truncated but not where a rollout
+    starts; the mean of the last ten entries that the rollout put there.
+    """
+    running, entries = 0.0, []
+    for iteration, recording in enumerate(recordings):
+        entries = []
+        for n, reward in enumerate(shaped_rewards(recording, cell, iteration)):
+            running += reward
+            if (n + 1) % 50 == 0:
+                entries.append(running)
+                running = 0.0
+    return np.mean(entries[-10:])
 
 
 def train(cell, seed, iterations=None):

@@ -103,12 +103,53 @@ def test_more_seeds_keep_the_blocks_there_are():
 
 def test_a_row_changes_the_settings_of_its_cells_only():
     config = copy.deepcopy(DEFAULT)
-    config["grid"][0]["variants"].remove("l2")
-    config["grid"].append({"variants": ["l2"], "budgets": [500_000], "ppo": {"learning_rate": 0.001}})
+    config["grid"][0]["variants"].remove("l2sq")
+    config["grid"].append({"variants": ["l2sq"], "budgets": [500_000], "ppo": {"learning_rate": 0.001}})
     cells = load_study(config).cells
     rates = {cell.folder: cell.protocol.ppo.learning_rate for cell in cells}
-    assert [folder for folder, rate in rates.items() if rate != 3e-4] == ["paper/l2/500000/alpha1"]
+    assert [folder for folder, rate in rates.items() if rate != 3e-4] == ["paper/l2sq/500000/alpha1"]
     assert cells[-1].protocol.ppo.epochs == 10
+
+
+def test_each_switch_is_turned_alone_and_taken_back_alone():
+    study = load_study(DEFAULT)
+    cells = {cell.protocol.name: cell.protocol for cell in study.experiment_cells["attribution"]}
+    start, end = study.protocols["paper"], study.protocols["released_late"]
+    switches = {
+        "d1": ("environment", {"control_weight"}), "d2": ("ppo", {"ratio_pairs"}),
+        "d3": ("ppo", {"gae_lambda"}), "d4": ("ppo", {"learning_rate"}),
+    }  # fmt: skip
+    assert len(study.experiment_cells["attribution"]) == 2 * len(cells) == 2 * (2 + 2 * len(switches))
+
+    def differing(one, other):
+        one, other = one.model_dump(exclude={"name"}), other.model_dump(exclude={"name"})
+        return {part: {key for key in one[part] if one[part][key] != other[part][key]} for part in one}
+
+    whole = differing(start, end)
+    for name, (part, keys) in switches.items():
+        alone, rest = cells[f"paper_with_{name}"], cells[f"released_late_without_{name}"]
+        for base, other, changed in ((start, end, alone), (end, start, rest)):
+            assert {where: own for where, own in differing(base, changed).items() if own} == {part: keys}
+            assert all(getattr(getattr(changed, part), key) == getattr(getattr(other, part), key) for key in keys)
+            assert keys <= whole[part]
+    # D5 to D7 are no switches: they change no number of `none` or `l2` at alpha0 = 1.
+    assert {(part, key) for part, keys in whole.items() for key in keys} - {
+        (part, key) for part, keys in switches.values() for key in keys
+    } == {("log", "episode_return"), ("shaping", "decay_potential"), ("shaping", "alpha0")}
+
+
+def test_released_protocols_differ_by_the_last_commits_two_changes():
+    protocols = load_study(DEFAULT).protocols
+    early, late = protocols["released"].model_dump(), protocols["released_late"].model_dump()
+    early["ppo"]["learning_rate"], early["shaping"]["decay_potential"], early["name"] = 1e-3, "l2sq", "released_late"
+    assert early == late
+
+
+def test_a_label_may_be_given_to_the_baseline():
+    """The released run called `none` 0.5: alpha0 is a label there, and needs no meaning."""
+    folders = [cell.folder for cell in load_study(DEFAULT).experiment_cells["released"]]
+    assert "released_late/none/500000/alpha0.5" in folders
+    assert len(folders) == 18
 
 
 @pytest.mark.parametrize(
@@ -121,6 +162,16 @@ def test_a_row_changes_the_settings_of_its_cells_only():
         ("seeds", None, ["seeds = None", "integer"]),
         ("seeds_per_block", 0, ["seeds_per_block = 0"]),
         ("root_seed", -1, ["root_seed = -1"]),
+        ("attribution.start", "text", ["attribution", "'text' is unknown", "paper"]),
+        ("attribution.variants", ["l3"], ["attribution.variants = 'l3'", "none"]),
+        ("attribution.switches.d1", ["ppo.speed"], ["attribution.switches.d1 = 'ppo.speed'", "no setting"]),
+        ("attribution.switches.d1", ["name"], ["attribution.switches.d1 = 'name'", "no setting"]),
+        ("attribution.switches.d1", ["ppo.epochs"], ["attribution.switches.d1 = 'ppo.epochs'", "10 at both ends"]),
+        ("experiments.released.grid.0.protocol", "late", ["experiments.released.grid.0.protocol = 'late'"]),
+        ("experiments.released.seeds", 0, ["experiments.released.seeds = 0"]),
+        ("grid.0.ppo", {"epochs": 5}, ["paper-none-500000-alpha1", "another study", "other settings"]),
+        ("protocols.paper.ppo.networks", "two", ["networks = 'two'", "'shared' or 'separate'"]),
+        ("protocols.paper.log.episode_return", "both", ["log.episode_return = 'both'", "'unshaped' or 'released'"]),
         ("evaluation.radius", 0, ["evaluation.radius = 0", "greater than 0"]),
         ("evaluation.radius", math.nan, ["evaluation.radius = nan", "finite"]),
         ("evaluation.radius", math.inf, ["evaluation.radius = inf", "finite"]),

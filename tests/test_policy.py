@@ -2,13 +2,15 @@
 
 import math
 
+import gymnasium
 import numpy as np
 import pytest
+import stable_baselines3
 import torch
 from plain_loop import Network
 
 from reacher_shaping.config import PPO
-from reacher_shaping.policy import ALIGNMENT, Policy, forward, initialise, inputs, layers, parameter_count
+from reacher_shaping.policy import ALIGNMENT, Policy, forward, initialise, inputs, parameter_count
 
 SEEDS = [0, 1, 5]
 
@@ -82,16 +84,50 @@ def test_initial_weights_depend_on_seed_and_root_alone():
     assert not torch.equal(rows[0], rows[1])
 
 
+@pytest.mark.parametrize("networks", ["shared", "separate"])
 @pytest.mark.parametrize("hidden", [64, 7])
-def test_weights_round_trip_bit_for_bit(hidden):
-    rows = initialise(SEEDS, 3, PPO(hidden_units=hidden))
-    layers(rows, hidden).log_std.fill_(-0.25)
-    policy = Policy(rows, hidden)
+def test_weights_round_trip_bit_for_bit(hidden, networks):
+    settings = PPO(hidden_units=hidden, networks=networks, initial_log_std=-0.25)
+    rows = initialise(SEEDS, 3, settings)
+    policy = Policy(rows, hidden, settings.towers)
+    assert torch.equal(policy.layers.log_std, torch.full((len(SEEDS), 2, 1), -0.25))
     copy = Policy.from_weights(policy.weights())
     assert torch.equal(copy.rows, rows)
-    assert copy.hidden == hidden
-    assert rows.shape[1] == parameter_count(hidden)
-    assert parameter_count(hidden) % ALIGNMENT == 0
+    assert (copy.hidden, copy.towers) == (hidden, settings.towers)
+    assert rows.shape[1] == parameter_count(hidden, settings.towers)
+    assert parameter_count(hidden, settings.towers) % ALIGNMENT == 0
+
+
+def test_a_network_of_two_trunks_is_that_of_torch():
+    settings = PPO(hidden_units=16, networks="separate", initial_log_std=-0.5)
+    policy = Policy(initialise(SEEDS, 3, settings), 16, 2)
+    observation = np.random.default_rng(3).normal(size=(3, 9, 10))
+    outputs = forward(policy.layers, inputs(observation))
+    for seed in range(3):
+        network = Network(16, separate=True)
+        network.load_state_dict({name: tensor[seed] for name, tensor in policy.weights().items()})
+        distribution, value = network(torch.from_numpy(observation[seed]).float())
+        torch.testing.assert_close(outputs[seed, :2].T, distribution.mean.detach())
+        torch.testing.assert_close(outputs[seed, 2], value.detach())
+        assert torch.equal(distribution.stddev, torch.full((9, 2), math.exp(-0.5)))
+
+
+def test_orthogonal_weights_are_orthogonal_with_stable_baselines3s_gains():
+    model = stable_baselines3.PPO("MlpPolicy", gymnasium.make("Reacher-v5"), seed=1, device="cpu").policy
+    theirs = {
+        "policy_trunk.0": model.mlp_extractor.policy_net[0], "policy_trunk.2": model.mlp_extractor.policy_net[2],
+        "value_trunk.0": model.mlp_extractor.value_net[0], "value_trunk.2": model.mlp_extractor.value_net[2],
+        "policy_mean": model.action_net, "value": model.value_net,
+    }  # fmt: skip
+    settings = PPO(networks="separate", initialisation="orthogonal")
+    weights = Policy(initialise([1], 3, settings), 64, 2).weights()
+    for name, layer in theirs.items():
+        ours, expected = weights[f"{name}.weight"][0], layer.weight.detach()
+        for matrix in (ours, expected):  # of the smaller side's size: the gain squared times the identity
+            product = matrix @ matrix.T if len(matrix) <= matrix.shape[1] else matrix.T @ matrix
+            gain = float(expected.norm() ** 2 / min(expected.shape))
+            torch.testing.assert_close(product, gain * torch.eye(len(product)), atol=1e-5, rtol=1e-4)
+        assert not weights[f"{name}.bias"].any()
 
 
 def test_weights_are_copies(policy):

@@ -16,27 +16,29 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from reacher_shaping import ppo
 from reacher_shaping.config import PPO
-from reacher_shaping.policy import Policy, initialise
+from reacher_shaping.policy import Policy, initialise, parameter_count
 
 HIDDEN = 8
 
 
 def network_of(rows, seed, hidden):
     """One seed of a stack as a torch.nn.Module of the same precision."""
-    network = Network(hidden).to(rows.dtype)
-    network.load_state_dict({name: tensor[seed] for name, tensor in Policy(rows, hidden).weights().items()})
+    towers = rows.shape[1] // parameter_count(hidden)
+    network = Network(hidden, separate=towers == 2).to(rows.dtype)
+    network.load_state_dict({name: tensor[seed] for name, tensor in Policy(rows, hidden, towers).weights().items()})
     return network
 
 
-def random_problem(key, *, seeds=3, count=64, hidden=HIDDEN, dtype=torch.float64, spread=0.3):
+def random_problem(key, *, seeds=3, count=64, hidden=HIDDEN, dtype=torch.float64, spread=0.3, networks="shared"):
     """Parameters [S, P] and records [S, N, 16]; `spread` moves the ratios out of the clip range."""
     generator = torch.Generator().manual_seed(key)
 
     def normal(*shape):
         return torch.randn(*shape, generator=generator, dtype=torch.float64)
 
-    rows = initialise(range(seeds), key, PPO(hidden_units=hidden)).double()
-    policy = Policy(rows, hidden)
+    options = PPO(hidden_units=hidden, networks=networks)
+    rows = initialise(range(seeds), key, options).double()
+    policy = Policy(rows, hidden, options.towers)
     policy.layers.log_std[:] = 0.5 * normal(seeds, 2, 1) - 0.5
     features = torch.cat([normal(seeds, count, 10), torch.ones(seeds, count, 1, dtype=torch.float64)], dim=-1)
     action, log_prob = normal(seeds, count, 2), torch.empty(seeds, count, dtype=torch.float64)
@@ -62,16 +64,24 @@ def minibatch(samples, seed):
     value=st.floats(0, 2),
     bonus=st.floats(0, 0.5),
     pairs=st.sampled_from(["sample", "minibatch"]),
+    networks=st.sampled_from(["shared", "separate"]),
 )
-def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, value, bonus, pairs):
+def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, value, bonus, pairs, networks):
     options = PPO(
-        hidden_units=HIDDEN, clip_range=clip, ratio_pairs=pairs, value_coefficient=value, entropy_coefficient=bonus
+        hidden_units=HIDDEN,
+        clip_range=clip,
+        ratio_pairs=pairs,
+        value_coefficient=value,
+        entropy_coefficient=bonus,
+        networks=networks,
     )
-    rows, records = random_problem(key, spread=spread)
+    rows, records = random_problem(key, spread=spread, networks=networks)
     samples = ppo.unpack(records)
     learner = ppo.Learner(rows, options)
     learner.differentiate(samples)
-    ours = Policy(learner.gradient, HIDDEN).weights()
+    ours = Policy(learner.gradient, HIDDEN, options.towers).weights()
+    owned = Policy.from_weights(ours).rows  # what the weights do not name is zero in it
+    assert torch.equal(learner.gradient.float(), owned)
     for seed in range(len(rows)):
         network = network_of(rows, seed, HIDDEN)
         loss(network, options, *minibatch(samples, seed)).backward()

@@ -49,6 +49,10 @@ def weight_error(state, of, seed, network):
         small("none", environment={"clip_actions": True, "control_weight": 1.0}, entropy_coefficient=0.0),
         small("none", gae_lambda=0.5, discount=0.9, clip_range=0.01, max_gradient_norm=0.05, hidden_units=16),
         small("l2", environment={"control_weight": 1.0}, ratio_pairs="minibatch", gae_lambda=0.0),
+        small("decay", alpha0=0.5, shaping={"decay_potential": "l2sq", "alpha0": "label"}),
+        small("none", networks="separate", initial_log_std=-1.0, learning_rate_schedule="linear"),
+        small("l2", networks="separate", initialisation="orthogonal", advantage_normalisation="minibatch"),
+        small("none", initialisation="orthogonal", hidden_units=16),
     ],
     ids=[
         "none",
@@ -62,6 +66,10 @@ def weight_error(state, of, seed, network):
         "clip_actions",
         "ppo",
         "released",
+        "released_decay",
+        "separate",
+        "standard",
+        "orthogonal",
     ],
 )
 def test_three_iterations_equal_the_plain_loop(of):
@@ -107,6 +115,24 @@ def test_an_iteration_of_the_papers_size_equals_the_plain_loop():
     for name, value in expected.items():
         assert progress[name] == pytest.approx(value, rel=2e-4), name
     assert progress["shaped_return"] != pytest.approx(progress["episode_return"], rel=1e-3)
+
+
+@pytest.mark.parametrize("steps", [192, 2048], ids=["first_episode_shown", "papers_size"])
+def test_the_released_log_equals_a_running_sum_over_the_plain_loop(steps):
+    """Of 3 episodes the first, with 42 steps left over from the rollout before, is among the last ten; of 40 not."""
+    of = small("l2", alpha0=5.0, iterations=3, rollout_steps=steps, log={"episode_return": "released"}, epochs=1)
+    recordings = []
+    for state, (_, recording) in zip(train(of, [1], radius=RADIUS), plain_loop.train(of, 1), strict=True):
+        recordings.append(recording)
+        found = state.progress["logged_return"][0, state.iteration - 1]
+        assert found == pytest.approx(plain_loop.released_log(of, recordings), rel=1e-5)
+        shown = abs(found / state.progress["shaped_return"][0, state.iteration - 1] - 1)
+        assert (shown > 0.05) == (steps == 192 and state.iteration > 1)
+
+
+def test_the_log_of_the_paper_is_the_unshaped_return():
+    progress = trained(small("l2"), [1]).progress
+    np.testing.assert_array_equal(progress["logged_return"], progress["episode_return"])
 
 
 @pytest.fixture(scope="module")

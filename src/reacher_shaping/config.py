@@ -307,7 +307,7 @@ class Study(Settings):
                     )
                 if known.setdefault(cell.folder, cell) != cell:
                     raise ValueError(
-                        f"experiments.{where}: cell {cell.name} is also elsewhere, with other settings; "
+                        f"{where}: cell {cell.name} is also in another study, with other settings; "
                         "allowed: the same, or a protocol of another name"
                     )
         return self
