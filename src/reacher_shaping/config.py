@@ -241,27 +241,39 @@ def _to_tuple(value: Any) -> Any:
 Rows = Annotated[tuple[Row, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
 
 
-class Experiment(Settings):
-    """A further study beside the main one, a target of its name: runs per cell, and its own grid."""
-
-    seeds: Annotated[int, Field(ge=1, le=10**5)]
-    grid: Rows
+Names = Annotated[tuple[Name, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
 
 
-class Attribution(Settings):
-    """What each switch between two protocols does: both ends, each switch alone, and all but it.
+class Switches(Settings):
+    """What each difference between two protocols does: cells of both ends, of each switch alone, and of all but it.
 
-    `switches` maps a name to the settings it stands for, such as `ppo.learning_rate`.
+    `settings` maps a switch to the settings it stands for, such as `ppo.learning_rate`; `budget` is in environment
+    steps.
     """
 
-    seeds: Annotated[int, Field(ge=1, le=10**5)]
     start: Name
     end: Name
-    switches: Annotated[
+    settings: Annotated[
         dict[Name, Annotated[tuple[str, ...], BeforeValidator(_to_tuple), Field(min_length=1)]], Field(min_length=1)
     ]
-    variants: Annotated[tuple[Name, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
+    variants: Names
     budget: Count
+    alpha0: Positive = 1.0
+
+
+class Experiment(Settings):
+    """A further study beside the main one, a target of its name: runs per cell, cells, and perhaps peers."""
+
+    seeds: Annotated[int, Field(ge=1, le=10**5)]
+    grid: Annotated[tuple[Row, ...], BeforeValidator(_to_tuple)] = ()
+    switches: Switches | None = None
+    peers: Peers | None = None
+
+    @model_validator(mode="after")
+    def _there_are_cells(self) -> Self:
+        if not self.grid and self.switches is None:
+            raise ValueError("grid is missing; allowed: a grid, switches, or both")
+        return self
 
 
 def _named(entries: Any) -> Any:
@@ -286,7 +298,6 @@ class Study(Settings):
     evaluation: Evaluation
     peers: Peers
     experiments: dict[Name, Experiment] = {}
-    attribution: Attribution | None = None
 
     @model_validator(mode="after")
     def _grid_is_possible(self) -> Self:
@@ -320,29 +331,33 @@ class Study(Settings):
     @cached_property
     def experiment_cells(self) -> dict[str, tuple[Cell, ...]]:
         """The cells of each further study, by its name; some may be another's or the main study's too."""
-        cells = {
-            name: self._cells_of_rows(f"experiments.{name}.grid", own.grid) for name, own in self.experiments.items()
-        }
-        return cells | ({"attribution": self._attribution_cells(self.attribution)} if self.attribution else {})
+        return {name: self._experiment_cells(name, experiment) for name, experiment in self.experiments.items()}
 
-    def experiment_seeds(self, name: str) -> int:
-        """Runs per cell of a further study."""
-        return self.attribution.seeds if name == "attribution" and self.attribution else self.experiments[name].seeds
+    def _experiment_cells(self, name: str, experiment: Experiment) -> tuple[Cell, ...]:
+        cells = self._cells_of_rows(f"experiments.{name}.grid", experiment.grid)
+        switches = experiment.switches
+        return cells if switches is None else cells + self._switched_cells(switches, f"experiments.{name}.switches")
 
-    def _attribution_cells(self, spec: Attribution) -> tuple[Cell, ...]:
-        for end in (spec.start, spec.end):
-            if end not in self.protocols:
-                raise ValueError(f"attribution: the protocol {end!r} is unknown; allowed: {', '.join(self.protocols)}")
-        start, end = (self.protocols[name].model_dump() for name in (spec.start, spec.end))
+    def _switched_cells(self, switches: Switches, where: str) -> tuple[Cell, ...]:
+        for key, value in (("start", switches.start), ("end", switches.end)):
+            if value not in self.protocols:
+                raise ValueError(f"{where}.{key} = {value!r} is unknown; allowed: {', '.join(self.protocols)}")
+        start, end = (self.protocols[name].model_dump() for name in (switches.start, switches.end))
         protocols = [start, end]
-        for switch, paths in spec.switches.items():
+        for switch, paths in switches.settings.items():
             for base, other, word in ((start, end, "with"), (end, start, "without")):
                 name = f"{base['name']}_{word}_{switch}"
-                protocols.append(_switched(base, other, paths, f"attribution.switches.{switch}") | {"name": name})
+                protocols.append(_switched(base, other, paths, f"{where}.settings.{switch}") | {"name": name})
         return tuple(
-            self._cell(Protocol.model_validate(protocol), variant, spec.budget, 1.0, "attribution")
+            self._cell(
+                Protocol.model_validate(protocol),
+                variant,
+                switches.budget,
+                1.0 if variant == "none" else switches.alpha0,
+                where,
+            )
             for protocol in protocols
-            for variant in spec.variants
+            for variant in switches.variants
         )
 
     def _cell(self, protocol: Protocol, variant: str, budget: int, alpha0: float, where: str) -> Cell:

@@ -1,7 +1,7 @@
 # The further studies of config.yaml, each an optional target of its name: `snakemake attribution`.
 def of_experiment(make):
     """A param or input made of the cells and seeds of the experiment named by the wildcard."""
-    return lambda wildcards: make(EXPERIMENTS[wildcards.experiment], STUDY.experiment_seeds(wildcards.experiment))
+    return lambda wildcards: make(EXPERIMENTS[wildcards.experiment], STUDY.experiments[wildcards.experiment].seeds)
 
 
 def of_blocks(file):

@@ -5,7 +5,7 @@ EXPERIMENTS = STUDY.experiment_cells  # the further studies' cells, see experime
 CELLS = {cell.folder: cell for cells in [STUDY.cells, *EXPERIMENTS.values()] for cell in cells}
 SEEDS = {
     block_name(seeds): seeds
-    for count in [STUDY.seeds, *map(STUDY.experiment_seeds, EXPERIMENTS)]
+    for count in [STUDY.seeds, *(experiment.seeds for experiment in STUDY.experiments.values())]
     for seeds in STUDY.blocks(count)
 }
 
