@@ -137,6 +137,7 @@ COMPARISONS = Table(
     measures=True,
 )
 PEERS = Table({"algorithm": TEXT, "seed": INTEGER, "budget": INTEGER}, measures=True)
+TRIALS = Table({"trial": INTEGER}, measures=True)
 VARIANCE = Table({**_CELL, "seeds": INTEGER}, measures=True)
 POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)
 LOTTERY = Table({"statement": TEXT}, measures=True)

@@ -27,7 +27,7 @@ from pydantic import (
     model_validator,
 )
 
-RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "tables"})
+RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$", max_length=40)]
 Count = Annotated[int, Field(ge=1, le=10**12)]
@@ -276,6 +276,43 @@ class Experiment(Settings):
         return self
 
 
+class Range(Settings):
+    """Numbers from `low` to `high` to search, whole ones if both are; evenly, or evenly in their logarithm."""
+
+    low: float | int
+    high: float | int
+    log: bool = False
+
+    @model_validator(mode="after")
+    def _is_a_range(self) -> Self:
+        if not self.low < self.high or (self.log and self.low <= 0):
+            raise ValueError(f"low = {self.low}, high = {self.high}: no range; allowed: low < high, and 0 < low if log")
+        return self
+
+
+class Choices(Settings):
+    """Numbers to choose from."""
+
+    choices: Annotated[tuple[float | int, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
+
+
+class Search(Settings):
+    """The search for a protocol's settings: `trials` of `seeds` runs each, under a root seed of their own.
+
+    `fixed` and `space` map settings such as `ppo.discount`, or `alpha0`, to what they are in every trial and to what is
+    tried; the others are those of `protocol`. `budget` is in environment steps.
+    """
+
+    protocol: Name
+    variant: Name
+    budget: Count
+    seeds: Annotated[int, Field(ge=1, le=1000)]
+    root_seed: Seed
+    trials: Annotated[int, Field(ge=1, le=10**5)]
+    fixed: dict[str, bool | int | float | str] = {}
+    space: Annotated[dict[str, Range | Choices], Field(min_length=1)]
+
+
 def _named(entries: Any) -> Any:
     """Give each entry of a mapping its key as `name`."""
     if not isinstance(entries, Mapping):
@@ -298,6 +335,7 @@ class Study(Settings):
     evaluation: Evaluation
     peers: Peers
     experiments: dict[Name, Experiment] = {}
+    search: Search | None = None
 
     @model_validator(mode="after")
     def _grid_is_possible(self) -> Self:
@@ -308,6 +346,7 @@ class Study(Settings):
         for name in self.protocols:
             if name in RESERVED_FOLDERS:
                 raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
+        self._search_is_possible()
         known: dict[str, Cell] = {}
         for where, cells in {"grid": self.cells, **self.experiment_cells}.items():
             names = [cell.name for cell in cells]
@@ -322,6 +361,22 @@ class Study(Settings):
                         "allowed: the same, or a protocol of another name"
                     )
         return self
+
+    def _search_is_possible(self) -> None:
+        search = self.search
+        if search is None:
+            return
+        for key, value, known in (
+            ("protocol", search.protocol, self.protocols),
+            ("variant", search.variant, self.variants),
+        ):
+            if value not in known:
+                raise ValueError(f"search.{key} = {value!r} is unknown; allowed: {', '.join(known)}")
+        settings = self.protocols[search.protocol].model_dump()
+        for path in search.space:
+            part, _, key = path.partition(".")
+            if path != "alpha0" and (not isinstance(settings.get(part), Mapping) or key not in settings[part]):
+                raise ValueError(f"search: {path!r} is no setting; allowed: alpha0, or such as 'ppo.discount'")
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
@@ -383,7 +438,7 @@ class Study(Settings):
                 for variant, budget, alpha0 in product(row.variants, row.budgets, row.alpha0)
             ]
         except ValidationError as error:
-            raise ValueError(f"{where}.{_one_line(error)}".replace("..", ".")) from None
+            raise ValueError(f"{where}.{first_problem(error)}".replace("..", ".")) from None
 
     def blocks(self, seeds: int | None = None) -> tuple[range, ...]:
         """Consecutive ranges of run seeds that train together; more seeds leave every full block as it is.
@@ -430,7 +485,7 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
     try:
         return Study.model_validate(dict(content))
     except ValidationError as error:
-        raise ConfigError(f"{name}: {_flat(_one_line(error))}") from None
+        raise ConfigError(f"{name}: {_flat(first_problem(error))}") from None
 
 
 class _UniqueKeys(yaml.SafeLoader):
@@ -466,7 +521,7 @@ def plain(number: float) -> str:
     return format(Decimal(repr(number)).normalize(), "f")
 
 
-def _one_line(error: ValidationError) -> str:
+def first_problem(error: ValidationError) -> str:
     """The first problem as `key = value: what is allowed`."""
     problem = error.errors(include_url=False)[0]
     key = ".".join(str(part) for part in problem["loc"] if part != "[key]")

@@ -71,7 +71,8 @@ def layers(rows: Tensor, hidden: int, towers: int = 1) -> Layers:
         size = math.prod(shape)
         views.append(stack[:, start : start + size].view(-1, *shape))
         start += size
-    return Layers(*views[:-1], log_std=views[-1][::towers])
+    *trunk_and_head, log_std = views
+    return Layers._make([*trunk_and_head, log_std[::towers]])
 
 
 def owned(towers: int) -> Tensor:
@@ -95,7 +96,7 @@ def initialise(seeds: Sequence[int], root_seed: int, settings: PPO) -> Tensor:
     for row, seed in enumerate(seeds):
         generator = stream(root_seed, Purpose.INITIALISATION, seed)
         for tower in range(towers):
-            draw(Layers(*(view[row * towers + tower] for view in network[:5]), network.log_std[row]), generator)
+            draw(Layers._make([*(view[row * towers + tower] for view in network[:5]), network.log_std[row]]), generator)
     for part in (network.head, network.head_bias):
         part.view(len(seeds), towers, *part.shape[1:]).mul_(owned(towers))
     network.log_std.fill_(settings.initial_log_std)

@@ -184,7 +184,8 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
     """
     logged = shaped.copy()
     logged[:, 0] += unlogged
-    return logged[:, -RELEASED_LOG_EPISODES:].mean(1)
+    figure: Array = logged[:, -RELEASED_LOG_EPISODES:].mean(1)
+    return figure
 
 
 def prepare(

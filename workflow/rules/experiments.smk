@@ -36,6 +36,4 @@ for name in EXPERIMENTS:
         name:
             name
         input:
-            expand(
-                "results/experiments/{experiment}/{file}.parquet", experiment=name, file=["runs", "cells", "curves"]
-            ),
+            expand("results/experiments/{experiment}/{file}.parquet", experiment=name, file=["runs", "cells", "curves"]),

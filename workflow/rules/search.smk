@@ -1,0 +1,22 @@
+# The search for the settings of the protocol `tuned`, an optional target: `snakemake search`. Nothing else depends on it:
+# what it found stands in config.yaml.
+if STUDY.search:
+
+    rule search:
+        output:
+            "results/search/trials.csv",
+        log:
+            "results/logs/search.log",
+        benchmark:
+            "results/benchmarks/search.tsv"
+        threads: 1
+        resources:
+            mem_mb=1000,
+        params:
+            search=as_json(STUDY.search.model_dump()),
+            protocol=as_json(STUDY.protocols[STUDY.search.protocol].model_dump()),
+            variant=as_json(STUDY.variants[STUDY.search.variant].model_dump()),
+            evaluation=as_json(STUDY.evaluation.model_dump()),
+            code=code("search"),
+        script:
+            "../scripts/search.py"

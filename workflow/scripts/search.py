@@ -1,0 +1,37 @@
+"""Search for the settings of the tuned protocol; an interrupted search goes on after its last trial."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import torch
+from job import logged
+
+from reacher_shaping import artifacts, search
+from reacher_shaping.config import Evaluation, Protocol, Search, Variant
+from reacher_shaping.meter import Meter
+
+params = snakemake.params
+spec = Search.model_validate_json(params.search)
+protocol, variant = Protocol.model_validate_json(params.protocol), Variant.model_validate_json(params.variant)
+evaluation = Evaluation.model_validate_json(params.evaluation)
+settings = [params.search, params.protocol, params.variant, params.evaluation, params.code]
+kept = Path("results/.checkpoints") / f"search-{hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:16]}.csv"
+
+
+def measure(values: search.Values) -> search.Values:
+    """Train and evaluate one trial."""
+    cell = search.cell_of(spec, protocol, variant, values)
+    return search.score(cell, spec.seeds, episodes=evaluation.episodes, radius=evaluation.radius)
+
+
+with logged(snakemake.log[0]) as say:
+    torch.set_num_threads(1)
+    done = artifacts.read_table(kept, artifacts.TRIALS) if kept.exists() else None
+    meter = Meter(spec.trials, spec.seeds * spec.budget, 0 if done is None else len(done), unit="trial")
+    for trials in search.trials(spec, measure, done):
+        artifacts.write_table(kept, trials, artifacts.TRIALS, sealed=False)
+        for line in meter.lines(len(trials)):
+            say(f"{line}, best return {trials['mean_return'].max():.3f}")
+    artifacts.write_table(snakemake.output[0], artifacts.read_table(kept, artifacts.TRIALS), artifacts.TRIALS)
+    kept.unlink(missing_ok=True)
