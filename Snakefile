@@ -26,9 +26,9 @@ include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/peers.smk"
 include: "workflow/rules/analyse.smk"
+include: "workflow/rules/figures.smk"
 include: "workflow/rules/experiments.smk"
 include: "workflow/rules/search.smk"
-include: "workflow/rules/figures.smk"
 include: "workflow/rules/notebooks.smk"
 include: "workflow/rules/media.smk"
 include: "workflow/rules/report.smk"
@@ -48,5 +48,6 @@ rule all:
         NOTEBOOKS,
         MEDIA,
         "results/check.txt",
+        MADE_FIGURES,
         "report/report.html",
         CRATE,

@@ -137,6 +137,13 @@ COMPARISONS = Table(
     measures=True,
 )
 PEERS = Table({"algorithm": TEXT, "seed": INTEGER, "budget": INTEGER}, measures=True)
+EFFECTS = Table(
+    {"variant": TEXT, "switch": TEXT, "setting": TEXT, "effect": TEXT, "metric": TEXT, "seeds": INTEGER}, measures=True
+)
+AGREEMENT = Table(
+    {"algorithm": TEXT, "budget": INTEGER, "metric": TEXT, "our_seeds": INTEGER, "their_seeds": INTEGER}, measures=True
+)
+LOGS = Table({**_CELL, "seed": INTEGER}, measures=True)
 TRIALS = Table({"trial": INTEGER}, measures=True)
 VARIANCE = Table({**_CELL, "seeds": INTEGER}, measures=True)
 POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)

@@ -13,7 +13,7 @@ With n paired seeds the smallest exact sign-flip p is 2 / 2^n: 0.002 for ten. A 
 comparisons could then never be significant after Holm, which is why not every pair of cells is compared.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from reacher_shaping import learning, stats
 from reacher_shaping.aggregate import KEY, Block, curve_array, generator
 
 METRICS = ("success_rate", "mean_return", "final_success_rate", "final_distance")
+SPEED = ("area_under_curve", "steps_to_threshold")
+"""Measures of learning speed, compared in the further studies."""
 FAMILIES = ("none", "constant", "longer", "half")
 
 
@@ -43,7 +45,7 @@ def partner(family: str, key: Mapping[str, Any], cells: pd.DataFrame) -> dict[st
     return None
 
 
-def comparison_frame(runs: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+def comparison_frame(runs: pd.DataFrame, root_seed: int, metrics: Sequence[str] = METRICS) -> pd.DataFrame:
     """A row per metric and comparison of the families above, paired on common seeds.
 
     Columns: family, metric, the cell's key, `other_variant, other_budget, other_alpha0`, difference, ci_low,
@@ -61,10 +63,10 @@ def comparison_frame(runs: pd.DataFrame, root_seed: int) -> pd.DataFrame:
                 continue
             ours, theirs = (by_cell[tuple(which[name] for name in KEY)] for which in (key, other))
             named = {f"other_{name}": other[name] for name in KEY[1:]}
-            for metric in METRICS:
+            for metric in metrics:
                 random = generator(root_seed, family, *key.values(), metric)
                 compared = _compare(
-                    ours[metric], theirs[metric], random, better=-1 if metric.endswith("distance") else 1
+                    ours[metric], theirs[metric], random, better=-1 if metric.endswith(("distance", "threshold")) else 1
                 )
                 rows.append({"family": family, "metric": metric} | key | named | compared)
     columns = ["family", "metric", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED]

@@ -248,7 +248,7 @@ class Switches(Settings):
     """What each difference between two protocols does: cells of both ends, of each switch alone, and of all but it.
 
     `settings` maps a switch to the settings it stands for, such as `ppo.learning_rate`; `budget` is in environment
-    steps.
+    steps; without `alone` the cells of each switch alone are left out.
     """
 
     start: Name
@@ -259,6 +259,7 @@ class Switches(Settings):
     variants: Names
     budget: Count
     alpha0: Positive = 1.0
+    alone: bool = True
 
 
 class Experiment(Settings):
@@ -401,6 +402,8 @@ class Study(Settings):
         protocols = [start, end]
         for switch, paths in switches.settings.items():
             for base, other, word in ((start, end, "with"), (end, start, "without")):
+                if word == "with" and not switches.alone:
+                    continue
                 name = f"{base['name']}_{word}_{switch}"
                 protocols.append(_switched(base, other, paths, f"{where}.settings.{switch}") | {"name": name})
         return tuple(

@@ -1,6 +1,6 @@
 """Tables as people read them: headings and rows of text, for the report and the notebooks."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,13 +36,20 @@ def to_markdown(grid: Grid) -> str:
     return "\n".join(f"| {line} |" for line in lines)
 
 
-def settings_grid(study: Mapping[str, Any]) -> Grid:
-    """Settings of each protocol side by side: a row per setting, a column per protocol."""
-    protocols = study.get("protocols", {})
-    flat = {name: _flatten({k: v for k, v in settings.items() if k != "name"}) for name, settings in protocols.items()}
+def settings_grid(study: Mapping[str, Any], protocols: Collection[str] | None = None) -> Grid:
+    """Settings of each protocol side by side: a row per setting, a column per protocol, of those named if any are."""
+    every = study.get("protocols", {})
+    shown = {name: settings for name, settings in every.items() if not protocols or name in protocols}
+    flat = {name: _flatten({k: v for k, v in settings.items() if k != "name"}) for name, settings in shown.items()}
     keys = list(dict.fromkeys(key for settings in flat.values() for key in settings))
     rows = [[key, *(plain(settings.get(key, "")) for settings in flat.values())] for key in keys]
-    return Grid(["Setting", *flat], rows)
+    return Grid(["Setting", *(name.replace("_", " ") for name in flat)], rows)
+
+
+def departures_grid(study: Mapping[str, Any]) -> Grid:
+    """Settings in which the protocols differ, side by side."""
+    grid = settings_grid(study)
+    return Grid(grid.headings, [row for row in grid.rows if len(set(row[1:])) > 1])
 
 
 def _flatten(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """The paper's four figures. Tables in, matplotlib figures out; no statistic is computed here."""
 
 import textwrap
+from collections.abc import Mapping
 
 import matplotlib as mpl
 import numpy as np
@@ -161,11 +162,19 @@ def figure_3(
     `correlation` has `protocol, method, x, y, r, ci_low, ci_high, level`; the second frame, of the same form without
     a protocol, holds the coefficients of the published table and gets its own panel.
     """
-    frames = {"This study": of_protocol(correlation, protocol), "Published Table 2": published_correlation}
-    given = {title: frame for title, frame in frames.items() if frame is not None}
-    figure = Figure(figsize=(4.6 * len(given) + 0.8, 4.5))
-    panels = figure.subplots(1, len(given), squeeze=False)[0]
-    for axes, (title, frame) in zip(panels, given.items(), strict=True):
+    ours = of_protocol(correlation, protocol)
+    frames = {"This study": ours[ours["level"] == "cells"]}
+    if published_correlation is not None:
+        frames["Published Table 2"] = published_correlation[published_correlation["level"] == "cells"]
+    return matrices(frames)
+
+
+@mpl.rc_context(STYLE)
+def matrices(frames: Mapping[str, pd.DataFrame]) -> Figure:
+    """A panel per frame of correlations, under its title; the frames hold one level each, as `correlation.csv`."""
+    figure = Figure(figsize=(4.6 * len(frames) + 0.8, 4.5))
+    panels = figure.subplots(1, len(frames), squeeze=False)[0]
+    for axes, (title, frame) in zip(panels, frames.items(), strict=True):
         axes.set_title(title)
         image = _draw_matrix(axes, frame)
     figure.colorbar(image, ax=list(panels), label="Pearson's r over cells", shrink=0.85)
@@ -175,7 +184,7 @@ def figure_3(
 def _draw_matrix(axes: Axes, correlation: pd.DataFrame) -> mpl.image.AxesImage:
     """The coefficients as coloured squares, each with its number and interval."""
     names = list(MEASURES)
-    chosen = correlation[(correlation["method"] == "pearson") & (correlation["level"] == "cells")]
+    chosen = correlation[correlation["method"] == "pearson"]
     matrix = np.full((len(names), len(names)), np.nan)
     np.fill_diagonal(matrix, 1.0)
     texts = {(i, i): "1" for i in range(len(names))}

@@ -5,9 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from scipy import stats as scipy_stats
 
 from reacher_shaping import answers, artifacts, stats, tables
 from reacher_shaping.aggregate import KEY
@@ -70,19 +68,11 @@ def compare(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
             ours, theirs = (stats.finite(frame[metric]) for frame in (own, by_cell[key]))
             low, high = stats.welch_interval(ours, theirs)
             difference = stats.mean(ours) - stats.mean(theirs)
-            values = (stats.mean(ours), stats.mean(theirs), difference, low, high, _p(ours, theirs))
+            values = (stats.mean(ours), stats.mean(theirs), difference, low, high, stats.welch_p(ours, theirs))
             rows.append((*key, metric, *values))
     columns = [*KEY, "metric", "ours", "reference", "difference", "ci_low", "ci_high", "p"]
     frame = pd.DataFrame(rows, columns=columns)
     return frame.assign(p_holm=stats.holm(frame["p"].to_numpy(dtype=float)))
-
-
-def _p(ours: np.ndarray[Any, Any], theirs: np.ndarray[Any, Any]) -> float:
-    if min(ours.size, theirs.size) < 2:
-        return float("nan")
-    if np.array_equal(ours, theirs) or np.ptp(ours) == np.ptp(theirs) == 0:
-        return 1.0 if ours.mean() == theirs.mean() else 0.0
-    return float(scipy_stats.ttest_ind(ours, theirs, equal_var=False).pvalue)
 
 
 def agreement(compared: pd.DataFrame) -> str:

@@ -11,9 +11,9 @@ import jinja2
 import numpy as np
 import pandas as pd
 
-from reacher_shaping import answers, captions, peer_results, precision, tables
+from reacher_shaping import answers, captions, experiment_report, peer_results, precision, tables
 from reacher_shaping.config import plain
-from reacher_shaping.grids import Grid, controllers_grid, of_table, settings_grid, study_grid
+from reacher_shaping.grids import Grid, controllers_grid, departures_grid, of_table, settings_grid, study_grid
 from reacher_shaping.style import cell_order, of_protocol, setting_label, variant_label
 
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
@@ -30,8 +30,8 @@ class Inputs:
     `study` holds the resolved settings; `published` comes from `tables.published_cells`; `controllers` has
     `controller, success_rate, final_success_rate, mean_return, final_distance`; `figures` maps names such as
     `figure_1` to SVG files, in the order to show; `power`, `variance`, `winners` and `spread` are the study's tables of
-    these names, `peers` that of the other algorithms; `ledger` has the claims' `id, evidence, shown_in`; relative
-    links start at `folder`.
+    these names, `peers` that of the other algorithms, `experiments` those of each further study, `training_logs` the
+    published logs' summaries; `ledger` has the claims' `id, evidence, shown_in`; relative links start at `folder`.
     """
 
     study: Mapping[str, Any]
@@ -46,6 +46,8 @@ class Inputs:
     winners: pd.DataFrame | None = None
     spread: pd.DataFrame | None = None
     peers: pd.DataFrame | None = None
+    experiments: Mapping[str, Mapping[str, pd.DataFrame]] = field(default_factory=dict)
+    training_logs: pd.DataFrame | None = None
     figures: Mapping[str, Path] = field(default_factory=dict)
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
@@ -82,18 +84,24 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     """Everything the template may name."""
     cells = of_protocol(inputs.cells, inputs.protocol)
     pictures = {name: _figure(name, path, inputs) for name, path in inputs.figures.items()}
+    own = ("figure_", *(f"{name}_" for name in inputs.experiments))
     return {
         "summary": answers.summary(cells, inputs.claims),
         "study": inputs.study,
-        "settings": settings_grid(inputs.study),
+        "settings": settings_grid(inputs.study, set(cells["protocol"])),
         "grid": study_grid(cells),
         "cell_count": len(cells),
         "run_count": int(cells["seeds"].sum()) if len(cells) else 0,
         "diverged": int(cells["diverged"].sum()) if len(cells) else 0,
         "pictures": pictures,
         "further": [
-            picture for name, picture in pictures.items() if not name.startswith("figure_") and name not in OWN_SECTION
+            picture for name, picture in pictures.items() if not name.startswith(own) and name not in OWN_SECTION
         ],
+        "experiments": [
+            experiment_report.section(name, given, inputs.figures, inputs.training_logs)
+            for name, given in inputs.experiments.items()
+        ],
+        "departures": departures_grid(inputs.study),
         "tables": _tables(cells, inputs),
         "sentences": _sentences(inputs),
         "controllers": controllers_grid(inputs.controllers, inputs.protocol),

@@ -109,6 +109,16 @@ def welch_interval(a: ArrayLike, b: ArrayLike, level: float = LEVEL) -> Interval
     return Interval(float(interval.low), float(interval.high))
 
 
+def welch_p(a: ArrayLike, b: ArrayLike) -> float:
+    """Two-sided p of Welch's t test of mean(a) = mean(b), unpaired; NaN with fewer than two finite values on a side."""
+    ours, theirs = finite(a), finite(b)
+    if min(ours.size, theirs.size) < 2:
+        return float("nan")
+    if np.ptp(ours) == np.ptp(theirs) == 0:
+        return 1.0 if ours[0] == theirs[0] else 0.0
+    return float(stats.ttest_ind(ours, theirs, equal_var=False).pvalue)
+
+
 def wilson_interval(successes: int, episodes: int, level: float = LEVEL) -> Interval:
     """Wilson score interval of a success rate over the episodes of *one* run (Wilson 1927)."""
     if episodes == 0:

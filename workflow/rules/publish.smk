@@ -14,6 +14,8 @@ rule build_crate:
             NOTEBOOKS,
             MEDIA,
             PEERS,
+            MADE_TABLES,
+            MADE_FIGURES,
             "results/check.txt",
             "report/report.html",
         ],

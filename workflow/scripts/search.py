@@ -15,7 +15,8 @@ params = snakemake.params
 spec = Search.model_validate_json(params.search)
 protocol, variant = Protocol.model_validate_json(params.protocol), Variant.model_validate_json(params.variant)
 evaluation = Evaluation.model_validate_json(params.evaluation)
-settings = [params.search, params.protocol, params.variant, params.evaluation, params.code]
+searched = json.dumps(spec.model_dump(exclude={"trials"}), sort_keys=True)  # more trials go on from fewer
+settings = [searched, params.protocol, params.variant, params.evaluation, params.code]
 kept = Path("results/.checkpoints") / f"search-{hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:16]}.csv"
 
 

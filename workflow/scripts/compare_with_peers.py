@@ -1,0 +1,12 @@
+"""An experiment's unshaped cells beside another implementation with the same settings."""
+
+import pandas as pd
+from job import logged
+
+from reacher_shaping import artifacts, experiments
+
+with logged(snakemake.log[0]):
+    runs = artifacts.read_table(snakemake.input.runs, artifacts.RUNS)
+    peers = [artifacts.read_table(path, artifacts.PEERS) for path in snakemake.input.peers]
+    agreement = experiments.agreement_frame(runs, pd.concat(peers, ignore_index=True))
+    artifacts.write_table(snakemake.output[0], agreement, artifacts.AGREEMENT)
