@@ -1,0 +1,164 @@
+"""What a switch does, what is logged, and whether two implementations agree, on made-up runs with known answers."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic
+from scipy import stats as scipy_stats
+
+from reacher_shaping import experiments
+from reacher_shaping.config import Protocol, Switches
+
+SWITCHES = Switches(
+    start="paper", end="late", settings={"a": ("ppo.epochs",), "b": ("ppo.discount",)}, variants=("none",), budget=4096
+)
+PROTOCOLS = {
+    "paper": Protocol(name="paper"),
+    "late": Protocol.model_validate(
+        {"name": "late", "environment": {"control_weight": 1.0}, "ppo": {"epochs": 5, "discount": 0.5}}
+    ),
+}
+PROTOCOLS |= {
+    name: PROTOCOLS["paper"].model_copy(update={"name": name})
+    for name in ("paper_with_a", "paper_with_b", "late_without_a", "late_without_b")
+}
+NOISE = np.array([-0.02, 0.01, 0.0, 0.03, -0.01, 0.02])
+
+
+def runs(means, budget=4096, variant="none"):
+    """Runs whose success is each protocol's mean plus the seed's own noise, common to all protocols."""
+    rows = []
+    for protocol, mean in means.items():
+        for seed, noise in enumerate(NOISE):
+            row = {"protocol": protocol, "variant": variant, "budget": budget, "alpha0": 1.0, "seed": seed}
+            row |= {"success_rate": mean + noise, "final_success_rate": mean / 2, "final_distance": 0.1 - mean / 10}
+            rows.append(row | {"reward_distance": -10.0, "reward_control": -2.0 - seed})
+    return pd.DataFrame(rows)
+
+
+MEANS = {
+    "paper": 0.30, "paper_with_a": 0.35, "paper_with_b": 0.28,
+    "late": 0.60, "late_without_a": 0.40, "late_without_b": 0.50,
+}  # fmt: skip
+
+
+def effect(frame, switch, kind, metric="success_rate"):
+    return frame[(frame["switch"] == switch) & (frame["effect"] == kind) & (frame["metric"] == metric)].iloc[0]
+
+
+def test_effects_are_the_differences_of_the_cells_and_the_common_noise_cancels():
+    frame = experiments.effects_frame(runs(MEANS), SWITCHES, PROTOCOLS, 0)
+    for switch, kind, expected in [
+        ("all", "all", 0.30), ("a", "alone", 0.05), ("a", "last", 0.20), ("a", "interaction", 0.15),
+        ("b", "alone", -0.02), ("b", "last", 0.10), ("b", "interaction", 0.12),
+    ]:  # fmt: skip
+        row = effect(frame, switch, kind)
+        assert row["difference"] == pytest.approx(expected), (switch, kind)
+        assert (row["ci_low"], row["ci_high"]) == pytest.approx((expected, expected))
+        assert row["p"] == pytest.approx(2 / 2 ** len(NOISE))
+        assert row["seeds"] == len(NOISE)
+    assert effect(frame, "a", "alone")["setting"] == "epochs 10 to 5"
+    assert effect(frame, "all", "all")["setting"] == "every switch"
+
+
+def test_holm_corrects_over_the_effects_of_one_kind_and_measure():
+    table = runs(MEANS)
+    table.loc[table["protocol"] == "paper_with_b", "success_rate"] = 0.28 + np.tile(NOISE[::-1], 1)
+    frame = experiments.effects_frame(table, SWITCHES, PROTOCOLS, 0)
+    alone = frame[(frame["effect"] == "alone") & (frame["metric"] == "success_rate")]
+    low, high = alone["p"].min(), alone["p"].max()
+    assert low < high
+    assert sorted(alone["p_holm"]) == pytest.approx([2 * low, max(2 * low, high)])
+
+
+def test_returns_are_compared_at_one_control_weight():
+    table = runs(MEANS)
+    found = experiments.unit_return(table, PROTOCOLS)
+    paper, late = (found[table["protocol"] == name].to_numpy() for name in ("paper", "late"))
+    np.testing.assert_allclose(paper, -10 - 10 * (2 + np.arange(6)))  # trained at a weight of 0.1
+    np.testing.assert_allclose(late, -10 - (2 + np.arange(6)))
+
+
+def test_effect_without_its_cells_is_left_out():
+    rest = {name: mean for name, mean in MEANS.items() if name != "paper_with_a"}
+    frame = experiments.effects_frame(runs(rest), SWITCHES, PROTOCOLS, 0)
+    assert set(frame.loc[frame["switch"] == "a", "effect"]) == {"last"}
+    assert set(frame.loc[frame["switch"] == "b", "effect"]) == {"alone", "last", "interaction"}
+    assert experiments.effects_frame(runs(MEANS, budget=8192), SWITCHES, PROTOCOLS, 0).empty
+
+
+def test_diverged_run_leaves_its_effects_only():
+    table = runs(MEANS)
+    table.loc[(table["protocol"] == "late_without_a") & (table["seed"] == 2), "success_rate"] = np.nan
+    frame = experiments.effects_frame(table, SWITCHES, PROTOCOLS, 0)
+    assert effect(frame, "a", "last")["seeds"] == len(NOISE) - 1
+    assert effect(frame, "b", "last")["seeds"] == len(NOISE)
+
+
+def test_logs_tell_peak_and_end_of_the_logged_return():
+    iteration = np.arange(1, 101)
+    peaked = np.where(iteration <= 30, -100 + 2.0 * iteration, -40.0 - (iteration - 30))
+    key = {"protocol": "released", "variant": "none", "budget": 204_800, "alpha0": 1.0}
+    progress = pd.DataFrame(
+        {"seed": 3, "iteration": iteration, "logged_return": peaked, "episode_return": 0.0, "action_std": 0.5, **key}
+    ).sample(frac=1, random_state=1)
+    row = experiments.logs_frame(progress).iloc[0]
+    means = np.convolve(peaked, np.ones(20) / 20, mode="valid")
+    assert row["peak_return"] == pytest.approx(means.max())
+    assert row["peak_iteration"] == means.argmax() + 20
+    assert row["final_return"] == pytest.approx(peaked[-20:].mean())
+    assert (row["seed"], row["action_std"]) == (3, 0.5)
+
+
+def labelled_runs():
+    grid = [("released", variant, budget, 1.0) for variant in ("none", "l2") for budget in (500_000, 1_000_000)]
+    grid += [("late", variant, 500_000, 0.5) for variant in ("none", "l2", "l2sq")]
+    table = synthetic.runs(grid, 3)
+    late = table["protocol"] == "late"
+    table.loc[late, "mean_return"] = -500.0 - 10 * table.loc[late, "seed"]
+    return table
+
+
+def test_labels_correlate_over_protocols_without_the_run_the_tables_leave_out():
+    table = labelled_runs()
+    frame = experiments.correlation_frame(table, synthetic.published(), "released", 0)
+
+    def r(level, x="alpha0", y="mean_return"):
+        chosen = (frame["method"] == "pearson") & (frame["level"] == level) & (frame["x"] == x) & (frame["y"] == y)
+        return frame.loc[chosen, ["r", "n"]].iloc[0]
+
+    kept = table[~((table["variant"] == "none") & (table["alpha0"] == 0.5))]
+    means = kept.groupby(["protocol", "variant", "budget", "alpha0"], as_index=False)["mean_return"].mean()
+    expected = np.corrcoef(means["alpha0"], means["mean_return"])[0, 1]
+    assert (r("cells")["r"], r("cells")["n"]) == (pytest.approx(expected), 6)
+    assert r("cells_all")["n"] == 7
+    one = kept[kept["seed"] == 1]
+    assert r("seed1")["r"] == pytest.approx(np.corrcoef(one["alpha0"], one["mean_return"])[0, 1])
+    assert r("published")["r"] == pytest.approx(0.910, abs=5e-4)
+    assert r("published", "success_rate")["r"] == pytest.approx(0.369, abs=5e-4)
+    assert set(frame["protocol"]) == {"released"}
+
+
+def peers(shift=0.0, seeds=5):
+    """Runs of a peer that are ours, or ours moved."""
+    table = synthetic.runs([("standard", "none", 500_000, 1.0)], seeds)
+    table["success_rate"] += shift
+    return table.assign(algorithm="ppo")[["algorithm", "seed", "budget", *experiments.AGREEMENT_METRICS]]
+
+
+def test_agreement_is_welchs_test_with_holm_over_the_measures():
+    ours = synthetic.runs([("standard", variant, 500_000, 1.0) for variant in ("l2", "none")], 8)
+    frame = experiments.agreement_frame(ours, peers(0.5)).set_index("metric")
+    none = ours[ours["variant"] == "none"]["success_rate"]
+    theirs = peers(0.5)["success_rate"]
+    row = frame.loc["success_rate"]
+    assert row["difference"] == pytest.approx(none.mean() - theirs.mean())
+    assert row["p"] == pytest.approx(scipy_stats.ttest_ind(none, theirs, equal_var=False).pvalue)
+    assert row["p_holm"] == pytest.approx(row["p"] * len(experiments.AGREEMENT_METRICS))
+    assert (row["our_seeds"], row["their_seeds"]) == (8, 5)
+    assert row["p_holm"] < 0.05 < frame.drop(index="success_rate")["p_holm"].min()
+
+
+def test_no_agreement_is_claimed_at_another_budget():
+    ours = synthetic.runs([("standard", "none", 1_000_000, 1.0)], 4)
+    assert experiments.agreement_frame(ours, peers()).empty

@@ -1,0 +1,99 @@
+"""The search proposes what its space allows, follows its score, and goes on as if it had not been interrupted."""
+
+import math
+
+import pandas as pd
+import pytest
+
+from reacher_shaping import search
+from reacher_shaping.config import PPO, ConfigError, Protocol, Search, Variant
+
+L2 = Variant(name="l2", potential="l2")
+SPEC = Search.model_validate(
+    {
+        "protocol": "standard", "variant": "l2", "budget": 4096, "seeds": 2, "root_seed": 5, "trials": 25,
+        "fixed": {"ppo.learning_rate_schedule": "linear"},
+        "space": {
+            "ppo.learning_rate": {"low": 1e-4, "high": 1e-2, "log": True},
+            "ppo.epochs": {"low": 1, "high": 9},
+            "ppo.minibatch_size": {"choices": (32, 64)},
+            "alpha0": {"low": 0.5, "high": 8.0},
+        },
+    }
+)  # fmt: skip
+PROTOCOL = Protocol(name="standard")
+
+
+def score(values):
+    """Best at a learning rate of 1e-3 and nine epochs."""
+    return {"mean_return": -abs(math.log10(values["ppo.learning_rate"]) + 3) - 0.1 * (9 - values["ppo.epochs"])}
+
+
+def finished(spec=SPEC, measure=score, done=None):
+    return list(search.trials(spec, measure, done))[-1]
+
+
+@pytest.fixture(scope="module")
+def table():
+    return finished()
+
+
+def test_trials_stay_in_the_space_and_whole_numbers_stay_whole(table):
+    assert len(table) == 25
+    assert table["ppo.learning_rate"].between(1e-4, 1e-2).all()
+    assert set(table["ppo.minibatch_size"]) == {32, 64}
+    assert set(table["ppo.epochs"]) <= set(range(1, 10))
+    assert table["alpha0"].between(0.5, 8).all()
+
+
+def test_search_finds_better_settings_than_its_random_start(table):
+    late, early = table["mean_return"].iloc[15:], table["mean_return"].iloc[: search.STARTUP]
+    assert late.mean() > early.mean() + 0.2
+    assert table["mean_return"].max() > early.max()
+
+
+def test_interrupted_search_ends_like_another(table, tmp_path):
+    path = tmp_path / "trials.csv"
+    table.head(13).astype({"ppo.epochs": float}).to_csv(path, index=False)
+    pd.testing.assert_frame_equal(finished(done=pd.read_csv(path)), table, check_dtype=False)
+
+
+def test_more_trials_begin_with_the_fewer(table):
+    fewer = finished(SPEC.model_copy(update={"trials": 12}))
+    pd.testing.assert_frame_equal(fewer, table.head(12))
+
+
+def test_diverged_trial_counts_as_the_worst_and_does_not_stop_the_search():
+    measured = []
+
+    def measure(values):
+        measured.append(values)
+        return {"mean_return": float("nan") if len(measured) in (1, 4) else score(values)["mean_return"]}
+
+    table = finished(SPEC.model_copy(update={"trials": 12}), measure)
+    assert table["mean_return"].isna().sum() == 2
+    assert len(table) == 12
+
+
+def test_a_trial_trains_the_protocol_with_its_own_settings_under_its_own_root():
+    values = {"ppo.learning_rate": 0.002, "ppo.epochs": 3, "ppo.minibatch_size": 32, "alpha0": 2.0}
+    cell = search.cell_of(SPEC, PROTOCOL, L2, values)
+    expected = PPO(learning_rate=0.002, epochs=3, minibatch_size=32, learning_rate_schedule="linear")
+    assert cell.protocol.ppo == expected
+    assert (cell.alpha0, cell.budget, cell.root_seed, cell.variant) == (2.0, 4096, 5, L2)
+
+
+def test_impossible_trial_is_one_line():
+    with pytest.raises(ConfigError, match=r"minibatch_size = 30 must divide rollout_steps = 2048") as caught:
+        search.cell_of(SPEC, PROTOCOL, L2, {"ppo.minibatch_size": 30})
+    assert "\n" not in str(caught.value)
+
+
+def test_score_is_the_mean_over_seeds_of_real_runs():
+    settings = PPO(rollout_steps=192, epochs=1, minibatch_size=32)
+    cell = search.cell_of(SPEC, Protocol(name="standard", ppo=settings), L2, {}).model_copy(update={"budget": 384})
+    found = search.score(cell, 2, episodes=50, radius=0.05)
+    assert found == search.score(cell, 2, episodes=50, radius=0.05)
+    assert set(found) == set(search.MEASURES)
+    assert -200 < found["mean_return"] < -5
+    assert 0 <= found["final_success_rate"] <= found["success_rate"] <= 1
