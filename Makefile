@@ -44,8 +44,8 @@ ifneq ($(wildcard results/runs.parquet),)
 	@echo "The report: $(CURDIR)/report/report.html"
 else
 	@mkdir -p build/reference/results
-	@rm -f build/reference/results/peers.parquet
-	@cp -p report/reference/* build/reference/results/
+	@rm -rf build/reference/results/peers.parquet build/reference/results/experiments
+	@cp -rp report/reference/* build/reference/results/
 	@python workflow/unlock.py build/reference
 	snakemake --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report --quiet rules -- report/reference.html
 	@echo "The report of the reference run: $(CURDIR)/build/reference/report/reference.html"

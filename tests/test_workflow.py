@@ -18,6 +18,15 @@ TINY = {
         {"variants": ["decay200k_l2sq"], "budgets": [2048], "alpha0": [0.5]},
     ],
 }
+FURTHER = {
+    "seeds": 1,
+    "grid": [{"protocol": "released_late", "variants": ["none"], "budgets": [2048], "alpha0": [0.5]}],
+    "switches": {
+        "start": "paper", "end": "standard", "settings": {"ends": ["shaping.episode_end"]},
+        "variants": ["none"], "budget": 2048,
+    },
+    "peers": {"seeds": 1, "budgets": {"ppo": 2048}},
+}  # fmt: skip
 NONE, DECAY = "results/paper/none/2048/alpha1", "results/paper/decay200k_l2sq/2048/alpha0.5"
 EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "check_results", "plot_figures"}
 
@@ -263,3 +272,29 @@ def test_block_made_again_has_the_same_bytes_and_reruns_nothing_else(project):
     project.run("--force", "--", f"{NONE}/seeds1-1/policy.pt")
     assert {name: artifacts.sha256(block / name) for name in names} == before
     assert set(project.planned()) == {"build_crate"}, "it lists the file that tells when the block was trained"
+
+
+def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp_path):
+    copy = project.copied(tmp_path / "copy")
+    with copy.configured(experiments={"mine": FURTHER}):
+        assert "aggregate_experiment" not in copy.planned()  # a plain call is the main study alone
+        shared = copy.planned("mine")["train_block"]
+        assert not [path for path in shared if path.startswith(f"{NONE}/seeds0-0/")]  # trained for the main study
+        copy.run("mine")
+        folder = copy.folder / "results/experiments/mine"
+        effects = artifacts.read_table(folder / "effects.csv", artifacts.EFFECTS)
+        assert set(effects["effect"]) == {"all", "alone", "last", "interaction"}
+        assert len(artifacts.read_table(folder / "agreement.csv", artifacts.AGREEMENT)) == 8
+        runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
+        assert set(runs["protocol"]) == {
+            "paper",
+            "standard",
+            "paper_with_ends",
+            "standard_without_ends",
+            "released_late",
+        }
+        assert copy.planned("mine") == {}
+        copy.run("--allowed-rules", "build_report", "--", "report/report.html")
+        page = (copy.folder / "report/report.html").read_text()
+        assert '<h3 id="mine">Mine</h3>' in page
+        assert 'id="mine_effects"' in page

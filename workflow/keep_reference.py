@@ -5,25 +5,37 @@ python workflow/keep_reference.py
 
 import shutil
 import sys
+from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from reacher_shaping import artifacts, reference, tables
-from reacher_shaping.config import block_name, load_study, require_mapping, settings_hash
+from reacher_shaping.config import Cell, block_name, load_study, require_mapping, settings_hash
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
 
 
+def manifests(cells: Iterable[Cell], blocks: Iterable[range]) -> list[dict[str, Any]]:
+    """The manifests of the blocks of cells."""
+    folders = [RESULTS / cell.folder / block_name(seeds) for cell, seeds in product(cells, blocks)]
+    return [artifacts.read_json(folder / "manifest.json") for folder in folders]
+
+
 def main() -> None:
     overlay = require_mapping(sys.argv[1]) if len(sys.argv) > 1 else {}
     study = load_study({**require_mapping("config.yaml"), **overlay})
-    folders = [RESULTS / cell.folder / block_name(seeds) for cell in study.cells for seeds in study.blocks()]
-    blocks = [artifacts.read_json(folder / "manifest.json") for folder in folders]
+    blocks = manifests(study.cells, study.blocks())
     reference.keep_tables(RESULTS, KEPT)
+    made = reference.keep_experiments(RESULTS, KEPT, list(study.experiments))
+    further = {
+        name: manifests(study.experiment_cells[name], study.blocks(study.experiments[name].seeds)) for name in made
+    }
     settings = study.model_dump(mode="json")
-    record = reference.manifest(settings, settings_hash(study), blocks)
+    record = reference.manifest(settings, settings_hash(study), blocks, further)
     artifacts.write_json(KEPT / "manifest.json", record)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 

@@ -1,6 +1,7 @@
 """The reference run: its summaries, kept in the repository, and how another run compares with it."""
 
 import re
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,8 +32,22 @@ TABLES = {
 }
 """The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
 
-OPTIONAL = {"peers.parquet": artifacts.PEERS}
+OPTIONAL = {"peers.parquet": artifacts.PEERS, "search/trials.csv": artifacts.TRIALS}
 """Tables that are kept with it where the run has them."""
+
+EXPERIMENT_TABLES = {
+    "runs.parquet": artifacts.RUNS,
+    "cells.parquet": artifacts.CELLS,
+    "curves.parquet": artifacts.CURVES,
+    "logs.parquet": artifacts.LOGS,
+    "logged.parquet": artifacts.CURVES,
+    "comparisons.parquet": artifacts.COMPARISONS,
+    "correlation.csv": artifacts.CORRELATION,
+    "controllers.parquet": artifacts.CONTROLLERS,
+    "effects.csv": artifacts.EFFECTS,
+    "agreement.csv": artifacts.AGREEMENT,
+}
+"""Tables of a further study; the last two are there where it has switches and peers."""
 
 COMPARED = ("success_rate", "mean_return")
 LEVEL = 0.05
@@ -44,12 +59,27 @@ def keep_tables(results: Path, kept: Path) -> None:
 
     Raises ArtifactError where another is missing or damaged.
     """
-    kept.mkdir(parents=True, exist_ok=True)
     for name, table in (TABLES | OPTIONAL).items():
         if name in OPTIONAL and not (results / name).exists():
             (kept / name).unlink(missing_ok=True)
             continue
-        artifacts.write_table(kept / name, artifacts.read_table(results / name, table), table, sealed=False)
+        _keep(results / name, kept / name, table)
+
+
+def keep_experiments(results: Path, kept: Path, names: Sequence[str]) -> list[str]:
+    """Write the tables of those further studies of `names` that were made; return their names. Raises ArtifactError."""
+    shutil.rmtree(kept / "experiments", ignore_errors=True)
+    made = [name for name in names if (results / "experiments" / name / "runs.parquet").exists()]
+    for experiment in made:
+        for name, table in EXPERIMENT_TABLES.items():
+            place = Path("experiments") / experiment / name
+            if name not in ("effects.csv", "agreement.csv") or (results / place).exists():
+                _keep(results / place, kept / place, table)
+    return made
+
+
+def _keep(source: Path, target: Path, table: artifacts.Table) -> None:
+    artifacts.write_table(target, artifacts.read_table(source, table), table, sealed=False)
 
 
 def compare(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
@@ -88,11 +118,24 @@ def agreement(compared: pd.DataFrame) -> str:
     return f"The runs differ beyond seed noise in {len(apart.groupby(KEY))} of {cells} cells: {names}."
 
 
-def manifest(settings: Mapping[str, Any], settings_hash: str, blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what the reference run was: the study's settings and each block's record, without its inputs."""
-    kept = ("seeds", "git", "machine", "threads", "versions", "wall_seconds", "cpu_seconds", "env_steps", "outputs")
-    records = [{name: block[name] for name in (*kept, "env_steps_per_second") if name in block} for block in blocks]
-    return {"study": settings, "settings_hash": settings_hash, "blocks": records}
+def manifest(
+    settings: Mapping[str, Any],
+    settings_hash: str,
+    blocks: Sequence[Mapping[str, Any]],
+    experiments: Mapping[str, Sequence[Mapping[str, Any]]],
+) -> dict[str, Any]:
+    """Return what the reference run was: settings, and the record of each block and of each further study's blocks.
+
+    The records are without their inputs.
+    """
+    numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads")
+    kept = ("seeds", "git", "machine", "versions", "outputs", *numbers)
+
+    def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        return [{name: block[name] for name in kept if name in block} for block in given]
+
+    further = {name: records(given) for name, given in experiments.items()}
+    return {"study": settings, "settings_hash": settings_hash, "blocks": records(blocks), "experiments": further}
 
 
 def headline(

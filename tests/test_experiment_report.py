@@ -1,0 +1,149 @@
+"""The further studies' figures and their section of the report show the numbers of their tables."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic
+from test_experiments import MEANS, PROTOCOLS, SWITCHES, labelled_runs, peers
+from test_experiments import runs as switched_runs
+
+from reacher_shaping import comparisons, experiment_figures, experiment_report, experiments
+from reacher_shaping.style import to_bytes
+
+LOGS = pd.DataFrame(
+    [{"run": "none_seed0", "variant": "none", "budget": 500_000, "peak_return": -38.6, "peak_iteration": 33,
+      "final_return": -87.2, "std_1": 0.4, "std_2": 0.54}]
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def effects():
+    return experiments.effects_frame(switched_runs(MEANS), SWITCHES, PROTOCOLS, 0)
+
+
+@pytest.fixture(scope="module")
+def released():
+    runs = labelled_runs().replace({"protocol": {"late": "released_late"}})
+    keys = runs[["protocol", "variant", "budget", "alpha0", "seed"]]
+    numbers = {"peak_return": -40.0 - runs["seed"], "peak_iteration": 30.0 + runs["seed"]}
+    logs = keys.assign(**numbers, final_return=-90.0, action_std=0.45)
+    return {
+        "runs": runs,
+        "cells": synthetic.summary(runs),
+        "logs": logs,
+        "comparisons": comparisons.comparison_frame(runs, 0, (*comparisons.METRICS, *comparisons.SPEED)),
+        "correlation": experiments.correlation_frame(runs, synthetic.published(), "released", 0),
+    }
+
+
+@pytest.fixture(scope="module")
+def section(released):
+    return experiment_report.section("released", released, ["released_log", "figure_1"], LOGS)
+
+
+def test_effects_figure_has_each_difference_with_its_interval(effects):
+    figure = experiment_figures.effects(effects)
+    axes = figure.axes[0]
+    drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_label() == "_effect")
+    shown = effects[(effects["metric"] == "success_rate") & (effects["effect"] != "interaction")]
+    assert drawn == pytest.approx(sorted(shown["difference"]))
+    filled = [line for line in axes.lines if line.get_label() == "_effect" and line.get_markerfacecolor() != "white"]
+    assert len(filled) == ((shown["ci_low"] > 0) | (shown["ci_high"] < 0)).sum() > 0
+    assert [label.get_text() for label in axes.get_yticklabels()] == [
+        "all switches", "a\nepochs 10 to 5", "b\ndiscount 0.99 to 0.5",
+    ]  # fmt: skip
+
+
+def test_effects_without_rows_are_an_empty_figure(effects):
+    assert to_bytes(experiment_figures.effects(effects.head(0)), "svg")
+
+
+def test_cells_figure_has_a_dot_per_run_in_every_panel(released):
+    controllers = synthetic.controllers().assign(protocol="released", mode="stochastic", final_success_rate=1.0)
+    controllers.loc[3, "controller"] = "inverse kinematics + PD"
+    figure = experiment_figures.cells(released["runs"], released["cells"], controllers)
+    for axes, metric in zip(figure.axes, experiment_figures.STRIP, strict=True):
+        dots = [x for line in axes.lines if line.get_label() == "_runs" for x in line.get_xdata()]
+        assert sorted(dots) == pytest.approx(sorted(released["runs"][metric]))
+    ceilings = [line.get_xdata()[0] for axes in figure.axes for line in axes.lines if line.get_label() == "_controller"]
+    assert ceilings == [1.0, 1.0, -3.7]
+    without = experiment_figures.cells(released["runs"], released["cells"])
+    assert not [line for axes in without.axes for line in axes.lines if line.get_label() == "_controller"]
+
+
+def test_log_figure_sets_the_published_peak_and_end_beside_the_curve_of_the_same_budget():
+    key = {"protocol": "released", "variant": "none", "alpha0": 1.0, "seeds": 5, "low": np.nan, "high": np.nan}
+    parts = [
+        pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": -50.0, "budget": budget, **key})
+        for budget in (500_000, 1_000_000)
+    ]
+    figure = experiment_figures.log(pd.concat(parts), LOGS)
+    marks = [line for axes in figure.axes for line in axes.lines if line.get_label() == "_published"]
+    assert [list(line.get_xdata()) for line in marks] == [[33, 245]]
+    assert [list(line.get_ydata()) for line in marks] == [[-38.6, -87.2]]
+    assert marks[0] in figure.axes[0].lines
+
+
+def test_correlation_figure_has_a_panel_each_for_the_published_ours_and_the_main_study(released):
+    titles = [axes.get_title(loc="left") for axes in experiment_figures.correlation(released["correlation"]).axes[:2]]
+    assert titles == ["Published Table 2", "Released code, labels as published"]
+    figure = experiment_figures.correlation(released["correlation"], synthetic.correlation())
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert any(text.startswith("0.91") for text in texts)
+    assert len(figure.axes) == 4  # three panels and the colours
+
+
+def test_section_tells_the_correlation_beside_the_published_one(section):
+    row = section.grids[next(name for name in section.grids if name.startswith("Pearson"))].rows[0]
+    assert row[0] == "r(α₀, return)"
+    assert row[1].startswith("0.91 [")
+    said = " ".join(section.sentences)
+    assert row[1] in said
+    assert row[2] in said
+    assert section.figures == ["released_log"]
+
+
+def test_section_lists_our_logs_and_then_the_published_one(section):
+    grid = section.grids[next(name for name in section.grids if name.startswith("What is logged"))]
+    rows = [[entry.replace("\N{MINUS SIGN}", "-") for entry in row] for row in grid.rows]
+    assert rows[0][:4] == ["released", "none", "500K, α₀ = 1", "31 [30, 32]"]
+    assert rows[0][4:] == ["-41.0 [-42.0, -40.0]", "-90.0 [-90.0, -90.0]", "0.45 [0.45, 0.45]"]
+    assert rows[-1] == ["published, none_seed0", "none", "500K", "33", "-38.6", "-87.2", "0.40 and 0.54"]
+    assert len(rows) == 7 + 1
+
+
+def test_section_of_switches_names_the_largest_effect_and_the_interactions(released, effects):
+    given = {**released, "effects": effects}
+    text = " ".join(experiment_report.section("attribution", given, [], LOGS).sentences)
+    assert "success, any step: a: epochs 10 to 5 (none, as the last one, to the end), 0.200 [0.200, 0.200]" in text
+    assert (
+        "What a switch does depends on the others beyond chance for a on" not in text
+    )  # p is 2 / 2^6, not corrected away
+    assert "No switch's effect depends on the others beyond chance." in text
+    strong = effects.assign(p_holm=effects["p_holm"] / 10)
+    text = experiment_report.effects_sentence(strong)
+    assert "depends on the others beyond chance for a on success, any step (none)" in text
+
+
+def test_section_says_whether_a_peer_differs(released):
+    ours = synthetic.runs([("standard", "none", 500_000, 1.0)], 8)
+    same = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers()))
+    assert same == "None of 8 measures differs from Stable-Baselines3's beyond chance (8 seeds beside 5)."
+    apart = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers(0.5)))
+    assert apart.startswith("1 of 8 measures differ")
+    assert apart.endswith("success, any step.")
+
+
+def test_section_counts_the_differences_that_survive_holm(released):
+    shaped = released["comparisons"][released["comparisons"]["family"] == "none"].copy()
+    shaped["p_holm"] = np.where(shaped["metric"] == "final_distance", 0.01, 0.5)
+    shaped.loc[shaped["metric"] == "final_distance", "difference"] = -0.01
+    text = experiment_report.shaping_sentence(shaped)
+    assert "distance at the last step (mm) in 2 of 2 (2 for the better)" in text
+    assert "success, any step in 0 of 2," in text
+
+
+def test_unknown_experiment_has_a_section_too(released):
+    section = experiment_report.section("my_study", released, [], None)
+    assert (section.title, section.intro) == ("My study", "")
+    assert section.grids
