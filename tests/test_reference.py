@@ -82,6 +82,23 @@ def test_peers_are_kept_where_the_run_has_them_and_go_where_it_has_none(tmp_path
     assert (kept / "runs.parquet").exists()
 
 
+@needs_reference
+def test_further_studies_that_were_made_are_kept(tmp_path):
+    results, kept = tmp_path / "results", tmp_path / "kept"
+    shutil.copytree(KEPT, results / "experiments" / "mine")
+    logs = pd.DataFrame({"protocol": ["a"], "variant": ["none"], "budget": [1], "alpha0": [1.0], "seed": [0]})
+    artifacts.write_table(results / "experiments/mine/logs.parquet", logs, artifacts.LOGS)
+    shutil.copy(KEPT / "curves.parquet", results / "experiments/mine/logged.parquet")
+    (kept / "experiments" / "old").mkdir(parents=True)
+    assert reference.keep_experiments(results, kept, ["mine", "yours"]) == ["mine"]
+    assert [folder.name for folder in (kept / "experiments").iterdir()] == ["mine"]
+    names = {path.name for path in (kept / "experiments" / "mine").iterdir()}
+    assert names == reference.EXPERIMENT_TABLES.keys() - {"effects.csv", "agreement.csv"}
+    (results / "experiments/mine/logs.parquet").unlink()
+    with pytest.raises(artifacts.ArtifactError, match=r"logs\.parquet"):
+        reference.keep_experiments(results, kept, ["mine"])
+
+
 def test_run_that_lacks_a_table_cannot_be_the_reference(tmp_path):
     with pytest.raises(artifacts.ArtifactError, match=r"runs\.parquet"):
         reference.keep_tables(tmp_path, tmp_path / "kept")
