@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from reacher_shaping import artifacts, jobs
-from reacher_shaping.config import Cell
+from reacher_shaping.cell import Cell
 from reacher_shaping.provenance import Record
 from reacher_shaping.rollout import Collector
 

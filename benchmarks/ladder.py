@@ -11,7 +11,7 @@ from peers import as_installed
 
 from reacher_shaping import ppo, rollout
 from reacher_shaping import train as training
-from reacher_shaping.config import Cell
+from reacher_shaping.cell import Cell
 from reacher_shaping.policy import forward, layers
 from reacher_shaping.reacher import ACTION_SIZE, Lanes
 

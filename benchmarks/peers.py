@@ -13,7 +13,7 @@ from plain_loop import Network
 from side_by_side import Workload
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from reacher_shaping.config import PPO, Cell
+from reacher_shaping.cell import PPO, Cell
 from reacher_shaping.policy import Policy
 from reacher_shaping.reacher import (
     ACTION_SIZE,

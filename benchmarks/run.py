@@ -31,7 +31,8 @@ from present import write
 from side_by_side import Measure, Workload, measure, pin, ratios, take_turns
 
 from reacher_shaping import jobs
-from reacher_shaping.config import Cell, load_study
+from reacher_shaping.cell import Cell
+from reacher_shaping.config import load_study
 from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.reacher import EPISODE_STEPS

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from reacher_shaping import artifacts, cli
-from reacher_shaping.config import PPO, Cell, Environment, Protocol, Variant
+from reacher_shaping.cell import PPO, Cell, Environment, Protocol, Variant
 from reacher_shaping.evaluate import evaluate
 from reacher_shaping.policy import Policy, initialise
 

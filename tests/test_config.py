@@ -10,19 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from reacher_shaping.config import (
-    PPO,
-    Cell,
-    ConfigError,
-    Environment,
-    Protocol,
-    Shaping,
-    Variant,
-    block_name,
-    load_study,
-    plain,
-    require_mapping,
-)
+from reacher_shaping.cell import PPO, Cell, ConfigError, Environment, Protocol, Shaping, Variant, plain
+from reacher_shaping.config import block_name, load_study, require_mapping
 
 ROOT = Path(__file__).parents[1]
 DEFAULT = yaml.safe_load((ROOT / "config.yaml").read_text())

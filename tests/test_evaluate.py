@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from stable_baselines3.common.monitor import Monitor
 
-from reacher_shaping.config import PPO
+from reacher_shaping.cell import PPO
 from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.policy import Policy, initialise, layers
 from reacher_shaping.streams import Purpose, stream

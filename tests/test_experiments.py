@@ -7,7 +7,8 @@ import synthetic
 from scipy import stats as scipy_stats
 
 from reacher_shaping import experiments
-from reacher_shaping.config import Protocol, Switches
+from reacher_shaping.cell import Protocol
+from reacher_shaping.config import Switches
 
 SWITCHES = Switches(
     start="paper", end="late", settings={"a": ("ppo.epochs",), "b": ("ppo.discount",)}, variants=("none",), budget=4096

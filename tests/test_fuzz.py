@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from reacher_shaping import artifacts, jobs
 from reacher_shaping.artifacts import ArtifactError
-from reacher_shaping.config import PPO, ConfigError, Study, load_study
+from reacher_shaping.cell import PPO, ConfigError
+from reacher_shaping.config import Study, load_study
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.policy_files import load_policies
 from reacher_shaping.train import train

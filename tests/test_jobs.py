@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from reacher_shaping import artifacts, jobs
-from reacher_shaping.config import PPO, Cell, Protocol, Variant
+from reacher_shaping.cell import PPO, Cell, Protocol, Variant
 from reacher_shaping.meter import Meter
 
 CELL = Cell(

@@ -9,7 +9,7 @@ import stable_baselines3
 import torch
 from plain_loop import Network
 
-from reacher_shaping.config import PPO
+from reacher_shaping.cell import PPO
 from reacher_shaping.policy import ALIGNMENT, Policy, forward, initialise, inputs, parameter_count
 
 SEEDS = [0, 1, 5]

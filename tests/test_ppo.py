@@ -15,7 +15,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from reacher_shaping import ppo
-from reacher_shaping.config import PPO
+from reacher_shaping.cell import PPO
 from reacher_shaping.policy import Policy, initialise, parameter_count
 
 HIDDEN = 8

@@ -6,7 +6,8 @@ import pandas as pd
 import pytest
 
 from reacher_shaping import search
-from reacher_shaping.config import PPO, ConfigError, Protocol, Search, Variant
+from reacher_shaping.cell import PPO, ConfigError, Protocol, Variant
+from reacher_shaping.config import Search
 
 L2 = Variant(name="l2", potential="l2")
 SPEC = Search.model_validate(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from reacher_shaping.config import Shaping, Variant
+from reacher_shaping.cell import Shaping, Variant
 from reacher_shaping.shaping import alpha, potential, shaping_reward
 
 STEPS = 50

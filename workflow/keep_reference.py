@@ -13,7 +13,8 @@ from typing import Any
 import pandas as pd
 
 from reacher_shaping import artifacts, reference, tables
-from reacher_shaping.config import Cell, block_name, load_study, require_mapping, settings_hash
+from reacher_shaping.cell import Cell
+from reacher_shaping.config import block_name, load_study, require_mapping, settings_hash
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"

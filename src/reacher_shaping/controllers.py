@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats as distributions
 
-from reacher_shaping.config import PPO
+from reacher_shaping.cell import PPO
 from reacher_shaping.evaluate import Actor, Mode, evaluate
 from reacher_shaping.policy import Policy, initialise
 from reacher_shaping.stats import wilson_interval

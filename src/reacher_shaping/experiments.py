@@ -21,7 +21,8 @@ import pandas as pd
 
 from reacher_shaping import learning, stats
 from reacher_shaping.aggregate import CORRELATED, KEY, correlations, generator, in_table_2
-from reacher_shaping.config import Protocol, Switches
+from reacher_shaping.cell import Protocol
+from reacher_shaping.config import Switches
 
 EFFECT_METRICS = ("success_rate", "final_success_rate", "unit_return", "final_distance")
 AGREEMENT_METRICS = (

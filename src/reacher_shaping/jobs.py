@@ -15,7 +15,7 @@ from pathlib import Path
 import torch
 
 from reacher_shaping import artifacts
-from reacher_shaping.config import Cell
+from reacher_shaping.cell import Cell
 from reacher_shaping.meter import Meter
 from reacher_shaping.ppo import Adam
 from reacher_shaping.train import TrainState, train

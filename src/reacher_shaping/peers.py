@@ -15,7 +15,8 @@ import torch
 from numpy.typing import NDArray
 
 from reacher_shaping.aggregate import evaluation_metrics
-from reacher_shaping.config import Evaluation, Protocol
+from reacher_shaping.cell import Protocol
+from reacher_shaping.config import Evaluation
 from reacher_shaping.evaluate import Actor, evaluate
 from reacher_shaping.meter import Meter
 

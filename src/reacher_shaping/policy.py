@@ -19,7 +19,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from reacher_shaping.config import PPO
+from reacher_shaping.cell import PPO
 from reacher_shaping.reacher import ACTION_SIZE, OBSERVATION_SIZE
 from reacher_shaping.streams import Purpose, stream
 

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from reacher_shaping.artifacts import ArtifactError, load_tensors, read_policy
-from reacher_shaping.config import Cell, Environment
+from reacher_shaping.cell import Cell, Environment
 from reacher_shaping.policy import Policy
 from reacher_shaping.provenance import recorded_checksum, unchanged
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from reacher_shaping.config import PPO
+from reacher_shaping.cell import PPO
 from reacher_shaping.policy import Layers, forward, from_towers, layers, owned, to_towers
 from reacher_shaping.reacher import ACTION_SIZE, OBSERVATION_SIZE
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping import answers, captions, experiment_report, peer_results, precision, tables
-from reacher_shaping.config import plain
+from reacher_shaping.cell import plain
 from reacher_shaping.grids import Grid, controllers_grid, departures_grid, of_table, settings_grid, study_grid
 from reacher_shaping.style import cell_order, of_protocol, setting_label, variant_label
 

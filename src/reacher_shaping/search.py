@@ -12,7 +12,8 @@ import optuna
 import pandas as pd
 from pydantic import ValidationError
 
-from reacher_shaping.config import Cell, ConfigError, Protocol, Search, Variant, first_problem
+from reacher_shaping.cell import Cell, ConfigError, Protocol, Variant, first_problem
+from reacher_shaping.config import Search
 from reacher_shaping.evaluate import evaluate
 from reacher_shaping.train import train
 

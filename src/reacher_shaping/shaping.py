@@ -6,7 +6,7 @@ r'(s, a, s', t) = r + alpha(t) (gamma Phi(s') - Phi(s))    (paper, section 3.4)
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reacher_shaping.config import Shaping, Variant
+from reacher_shaping.cell import Shaping, Variant
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ import torch
 from job import logged
 
 from reacher_shaping import artifacts
-from reacher_shaping.config import Evaluation, Protocol
+from reacher_shaping.cell import Protocol
+from reacher_shaping.config import Evaluation
 from reacher_shaping.controllers import evaluate_controllers
 
 params = snakemake.params

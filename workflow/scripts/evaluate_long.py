@@ -4,7 +4,8 @@ import torch
 from job import logged
 
 from reacher_shaping import artifacts
-from reacher_shaping.config import Environment, Evaluation
+from reacher_shaping.cell import Environment
+from reacher_shaping.config import Evaluation
 from reacher_shaping.long_episodes import evaluate_lengths
 from reacher_shaping.policy import Policy
 from reacher_shaping.provenance import unchanged

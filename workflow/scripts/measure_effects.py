@@ -5,7 +5,8 @@ import json
 from job import logged
 
 from reacher_shaping import artifacts, experiments
-from reacher_shaping.config import Protocol, Switches
+from reacher_shaping.cell import Protocol
+from reacher_shaping.config import Switches
 
 params = snakemake.params
 protocols = {settings["name"]: Protocol.model_validate(settings) for settings in json.loads(params.protocols)}

@@ -4,7 +4,7 @@ import torch
 from job import logged
 
 from reacher_shaping import artifacts, media
-from reacher_shaping.config import Environment
+from reacher_shaping.cell import Environment
 from reacher_shaping.policy import Policy
 from reacher_shaping.provenance import unchanged
 

@@ -8,7 +8,8 @@ import torch
 from job import logged
 
 from reacher_shaping import artifacts, search
-from reacher_shaping.config import Evaluation, Protocol, Search, Variant
+from reacher_shaping.cell import Protocol, Variant
+from reacher_shaping.config import Evaluation, Search
 from reacher_shaping.meter import Meter
 
 params = snakemake.params

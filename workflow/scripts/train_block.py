@@ -7,7 +7,7 @@ from pathlib import Path
 from job import logged
 
 from reacher_shaping import artifacts, jobs
-from reacher_shaping.config import Cell
+from reacher_shaping.cell import Cell
 from reacher_shaping.provenance import Record, reached_files
 
 record = Record()

@@ -3,7 +3,8 @@
 from job import logged
 
 from reacher_shaping import artifacts, peers
-from reacher_shaping.config import Evaluation, Protocol
+from reacher_shaping.cell import Protocol
+from reacher_shaping.config import Evaluation
 
 params, wildcards = snakemake.params, snakemake.wildcards
 
