@@ -1,9 +1,12 @@
+import time
+
 import pytest
 import torch
 
 from reacher_shaping import artifacts, jobs
 from reacher_shaping.cell import PPO, Cell, Protocol, Variant
 from reacher_shaping.meter import Meter
+from reacher_shaping.provenance import Record
 
 CELL = Cell(
     protocol=Protocol(name="test", ppo=PPO(rollout_steps=256, epochs=2)),
@@ -13,13 +16,14 @@ CELL = Cell(
 SEEDS = [3, 5]
 
 
-def trained(folder, lines, seconds_per_checkpoint=30.0):
+def trained(folder, lines, seconds_per_checkpoint=30.0, record=None):
     with jobs.trained_block(
         CELL,
         SEEDS,
         radius=0.02,
         folder=folder,
         report=lines.append,
+        record=record,
         seconds_per_checkpoint=seconds_per_checkpoint,
     ) as (state, done):
         return state, done
@@ -53,6 +57,19 @@ def test_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch, aft
     assert torch.equal(whole.rows, resumed.rows)
     assert whole.progress_frame().equals(resumed.progress_frame())
     assert whole.episodes_frame().equals(resumed.episodes_frame())
+
+
+def test_time_before_an_interruption_is_counted(tmp_path, monkeypatch):
+    begun = time.perf_counter()
+    interrupted(tmp_path / "cut", monkeypatch, 3)
+    spent = time.perf_counter() - begun
+    record = Record()
+    trained(tmp_path / "cut", [], record=record)
+    here = time.perf_counter() - begun - spent
+    wall, cpu = record.seconds()
+    assert here < wall < here + spent + 0.1
+    assert wall > here + 0.3 * spent
+    assert cpu > 0
 
 
 def test_finished_block_leaves_no_checkpoint(tmp_path):

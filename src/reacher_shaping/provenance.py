@@ -133,14 +133,23 @@ class Record:
     wall: float = field(default_factory=time.perf_counter)
     cpu: float = field(default_factory=time.process_time)
 
+    def add(self, wall: float, cpu: float) -> None:
+        """Count the seconds that a process before this one spent on the same job."""
+        self.wall -= wall
+        self.cpu -= cpu
+
+    def seconds(self) -> tuple[float, float]:
+        """Wall and CPU seconds so far."""
+        return time.perf_counter() - self.wall, time.process_time() - self.cpu
+
     def to_dict(
         self, folder: Path, inputs: Iterable[Path], outputs: Iterable[Path], env_steps: int, threads: int
     ) -> dict[str, Any]:
-        """The job's part of a manifest; `env_steps` are those this process took.
+        """The job's part of a manifest; `env_steps` are those it took, in this and in earlier processes.
 
         Files are named relative to `folder`, or by their name alone outside it.
         """
-        wall = time.perf_counter() - self.wall
+        wall, cpu = self.seconds()
         return {
             "inputs": _checksums(folder, inputs),
             "outputs": _checksums(folder, outputs),
@@ -151,7 +160,7 @@ class Record:
             "started": self.started.isoformat(timespec="seconds"),
             "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "wall_seconds": round(wall, 3),
-            "cpu_seconds": round(time.process_time() - self.cpu, 3),
+            "cpu_seconds": round(cpu, 3),
             "env_steps": env_steps,
             "env_steps_per_second": round(env_steps / wall, 1),
         }

@@ -19,13 +19,15 @@ settings = {"cell": cell.settings(), "radius": params.radius}
 
 with logged(snakemake.log[0]) as say:
     checkpoints = Path("results/.checkpoints") / key
-    with jobs.trained_block(cell, params.seeds, radius=params.radius, folder=checkpoints, report=say) as (state, done):
+    with jobs.trained_block(
+        cell, params.seeds, radius=params.radius, folder=checkpoints, report=say, record=record
+    ) as (state, _):
         weights = state.policy(cell).weights()
         artifacts.write_policy(output.policy, params.seeds, weights, settings)
         artifacts.write_table(output.progress, state.progress_frame(), artifacts.PROGRESS)
         artifacts.write_monitors(output.monitor, state.episodes_frame())
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
-        steps = done * cell.protocol.ppo.rollout_steps * len(params.seeds)
+        steps = state.iteration * cell.protocol.ppo.rollout_steps * len(params.seeds)
         training = record.to_dict(block, reached_files(__file__), files, steps, snakemake.threads)
         who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
         artifacts.write_json(output.training, {**who, **training})
