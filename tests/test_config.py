@@ -174,6 +174,7 @@ def test_a_label_may_be_given_to_the_baseline():
         ("grid.0.ppo", {"epochs": 5}, ["paper-none-500000-alpha1", "another study", "other settings"]),
         ("protocols.paper.ppo.networks", "two", ["networks = 'two'", "'shared' or 'separate'"]),
         ("protocols.paper.log.episode_return", "both", ["log.episode_return = 'both'", "'unshaped' or 'released'"]),
+        ("protocols.paper.ppo.learning_rate", "3e-4", ["learning_rate = '3e-4'", "YAML reads this as text", "3.0e-4"]),
         ("evaluation.radius", 0, ["evaluation.radius = 0", "greater than 0"]),
         ("evaluation.radius", math.nan, ["evaluation.radius = nan", "finite"]),
         ("evaluation.radius", math.inf, ["evaluation.radius = inf", "finite"]),

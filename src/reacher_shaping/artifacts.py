@@ -69,7 +69,7 @@ class Table:
 
 
 _CELL = {"protocol": TEXT, "variant": TEXT, "budget": INTEGER, "alpha0": NUMBER}
-_PROGRESS_NUMBERS = (
+MEASURES = (
     "episode_return",
     "shaped_return",
     "episode_length",
@@ -84,11 +84,12 @@ _PROGRESS_NUMBERS = (
     "explained_variance",
     "logged_return",
 )
+"""The measures of a training iteration."""
 _EPISODE_NUMBERS = ("episode_return", "reward_distance", "reward_control", "min_distance", "final_distance")
 
 PROGRESS = Table(
-    {"seed": INTEGER, "iteration": INTEGER, "env_steps": INTEGER, **dict.fromkeys(_PROGRESS_NUMBERS, NUMBER)},
-    optional=frozenset(_PROGRESS_NUMBERS),
+    {"seed": INTEGER, "iteration": INTEGER, "env_steps": INTEGER, **dict.fromkeys(MEASURES, NUMBER)},
+    optional=frozenset(MEASURES),
 )
 EPISODES = Table(
     {

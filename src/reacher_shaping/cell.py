@@ -20,6 +20,8 @@ Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
+_EXPONENT = re.compile(r"[+-]?\d+e[+-]?\d+", re.IGNORECASE)
+
 
 class ConfigError(ValueError):
     """A setting is missing, unknown or impossible; the message is one line: key, value, what is allowed."""
@@ -201,7 +203,9 @@ def first_problem(error: ValidationError) -> str:
     if problem["type"] == "value_error":  # raised by a validator here, with key and value in its own words
         message = str(problem["ctx"]["error"])
         return f"{key}.{message}" if key else message
-    return f"{key} = {short(problem['input'])}: {_allowed(problem['msg'])}"
+    value = problem["input"]
+    hint = "; YAML reads this as text: write 0.0003 or 3.0e-4" if _EXPONENT.fullmatch(str(value)) else ""
+    return f"{key} = {short(value)}: {_allowed(problem['msg'])}{hint}"
 
 
 def _allowed(message: str) -> str:

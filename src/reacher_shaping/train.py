@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from reacher_shaping import advantage, ppo, shaping
+from reacher_shaping.artifacts import MEASURES
 from reacher_shaping.cell import PPO, Cell
 from reacher_shaping.policy import Policy, forward, initialise, inputs
 from reacher_shaping.reacher import ACTION_SIZE, EPISODE_STEPS
@@ -23,24 +24,6 @@ from reacher_shaping.streams import Purpose, stream
 
 Array = NDArray[np.float64]
 Rows = dict[str, NDArray[Any]]
-
-
-MEASURES = (
-    "episode_return",
-    "shaped_return",
-    "episode_length",
-    "success_rate",
-    "final_distance",
-    "action_std",
-    "entropy",
-    "approx_kl",
-    "clip_fraction",
-    "policy_loss",
-    "value_loss",
-    "explained_variance",
-    "logged_return",
-)
-"""The measures of an iteration, in the order of `progress.parquet`."""
 
 
 RELEASED_LOG_EPISODES = 10
