@@ -36,7 +36,8 @@ def main() -> None:
         name: manifests(study.experiment_cells[name], study.blocks(study.experiments[name].seeds)) for name in made
     }
     settings = study.model_dump(mode="json")
-    record = reference.manifest(settings, settings_hash(study), blocks, further)
+    peers = [artifacts.read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
+    record = reference.manifest(settings, settings_hash(study), blocks, further, peers)
     artifacts.write_json(KEPT / "manifest.json", record)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 

@@ -123,19 +123,21 @@ def manifest(
     settings_hash: str,
     blocks: Sequence[Mapping[str, Any]],
     experiments: Mapping[str, Sequence[Mapping[str, Any]]],
+    peers: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    """Return what the reference run was: settings, and the record of each block and of each further study's blocks.
+    """Return what the reference run was: settings, and the record of each block, further study's block and peer.
 
     The records are without their inputs.
     """
     numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads")
-    kept = ("seeds", "git", "machine", "versions", "outputs", *numbers)
+    kept = ("algorithm", "seeds", "git", "machine", "versions", "outputs", *numbers)
 
     def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         return [{name: block[name] for name in kept if name in block} for block in given]
 
     further = {name: records(given) for name, given in experiments.items()}
-    return {"study": settings, "settings_hash": settings_hash, "blocks": records(blocks), "experiments": further}
+    told = {"blocks": records(blocks), "experiments": further, "peers": records(peers)}
+    return {"study": settings, "settings_hash": settings_hash, **told}
 
 
 def headline(

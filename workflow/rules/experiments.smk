@@ -96,7 +96,8 @@ use rule evaluate_controllers as evaluate_experiment_controllers with:
 
 use rule train_peer as train_experiment_peer with:
     output:
-        "results/experiments/{experiment}/peers/{algorithm}/seed{seed}.parquet",
+        run="results/experiments/{experiment}/peers/{algorithm}/seed{seed}.parquet",
+        manifest="results/experiments/{experiment}/peers/{algorithm}/seed{seed}.json",
     log:
         "results/logs/experiments/{experiment}/{algorithm}-{seed}.log",
     benchmark:

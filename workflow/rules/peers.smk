@@ -13,7 +13,8 @@ rule peers:
 
 rule train_peer:
     output:
-        "results/peers/{algorithm}/seed{seed}.parquet",
+        run="results/peers/{algorithm}/seed{seed}.parquet",
+        manifest="results/peers/{algorithm}/seed{seed}.json",
     log:
         "results/logs/peers/{algorithm}-{seed}.log",
     benchmark:

@@ -1,12 +1,17 @@
 """Train and evaluate one run of another algorithm."""
 
+import json
+from pathlib import Path
+
 from job import logged
 
 from reacher_shaping import artifacts, peers
 from reacher_shaping.cell import Protocol
 from reacher_shaping.config import Evaluation
+from reacher_shaping.provenance import Record, reached_files
 
-params, wildcards = snakemake.params, snakemake.wildcards
+record = Record()
+params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
 
 with logged(snakemake.log[0]) as say:
     run = peers.peer_run(
@@ -18,4 +23,9 @@ with logged(snakemake.log[0]) as say:
         params.root_seed,
         say,
     )
-    artifacts.write_table(snakemake.output[0], run, artifacts.PEERS)
+    artifacts.write_table(output.run, run, artifacts.PEERS)
+    path = Path(output.run)
+    told = record.to_dict(path.parent, reached_files(__file__), [path], params.budget, snakemake.threads)
+    settings = {"protocol": json.loads(params.protocol), "evaluation": json.loads(params.evaluation)}
+    who = {"algorithm": wildcards.algorithm, "seeds": [int(wildcards.seed)], "settings": settings}
+    artifacts.write_json(output.manifest, {**who, "code": params.code, **told})
