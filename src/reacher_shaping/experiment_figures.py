@@ -26,7 +26,7 @@ from reacher_shaping.style import (
     variant_order,
 )
 
-__all__ = ["cells", "correlation", "effects", "forest", "log", "save"]
+__all__ = ["cells", "correlation", "draw", "effects", "forest", "log", "save"]
 
 STRIP = {
     "success_rate": "Success, any step",
@@ -41,6 +41,21 @@ EFFECT_LABELS = {
 WIDE = 150
 KINDS = {"alone": "alone, from the start", "last": "as the last one, to the end", "all": "all together"}
 MARKERS = {"alone": "o", "last": "s", "all": "D"}
+
+
+def draw(
+    view: str, tables: Mapping[str, pd.DataFrame], training_logs: pd.DataFrame, main: pd.DataFrame | None = None
+) -> Figure:
+    """The figure of that name (`views.NAMES`) from an experiment's tables; `main`: the main study's correlations."""
+    if view == "cells":
+        return cells(tables["runs"], tables["cells"], tables["controllers"])
+    if view == "effects":
+        return effects(tables["effects"])
+    if view == "log":
+        return log(tables["logged"], training_logs)
+    if view == "correlation":
+        return correlation(tables["correlation"], main)
+    return forest(tables["comparisons"])
 
 
 def protocol_label(name: str) -> str:

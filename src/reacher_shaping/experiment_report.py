@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping import artifacts, tables
+from reacher_shaping import artifacts, grids, tables
 from reacher_shaping.experiment_figures import KINDS, protocol_label, switch_label
 from reacher_shaping.grids import Grid, of_table
 from reacher_shaping.style import budget_label, cell_order, number, setting_label, variant_label
@@ -19,6 +19,9 @@ LEVEL = 0.05
 SCHEMAS = {
     "runs": artifacts.RUNS,
     "cells": artifacts.CELLS,
+    "controllers": artifacts.CONTROLLERS,
+    "curves": artifacts.CURVES,
+    "logged": artifacts.CURVES,
     "logs": artifacts.LOGS,
     "comparisons": artifacts.COMPARISONS,
     "correlation": artifacts.CORRELATION,
@@ -83,8 +86,7 @@ def read(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
     """The tables of experiments by experiment and name, from their files. Raises ArtifactError."""
     found: dict[str, dict[str, pd.DataFrame]] = {}
     for path in map(Path, paths):
-        if path.stem in SCHEMAS:
-            found.setdefault(path.parent.name, {})[path.stem] = artifacts.read_table(path, SCHEMAS[path.stem])
+        found.setdefault(path.parent.name, {})[path.stem] = artifacts.read_table(path, SCHEMAS[path.stem])
     return found
 
 
@@ -92,38 +94,45 @@ def section(
     name: str, given: Mapping[str, pd.DataFrame], figures: Iterable[str], training_logs: pd.DataFrame | None
 ) -> Section:
     """What the report says of one experiment, from its tables and the names of all figures."""
-    said, grids = [], {}
+    said, found = [], {}
     if "effects" in given:
         said.append(effects_sentence(given["effects"]))
-        grids["What each switch does, mean over seeds [95 % interval]; p is Holm-corrected over a column"] = (
+        found["What each switch does, mean over seeds [95 % interval]; p is Holm-corrected over a column"] = (
             effects_grid(given["effects"])
         )
     if given["cells"]["alpha0"].nunique() > 1:
         said.append(correlation_sentence(given["correlation"]))
-        grids["Pearson's correlation over cells [95 % bootstrap interval], and its range over studies of one seed"] = (
+        found["Pearson's correlation over cells [95 % bootstrap interval], and its range over studies of one seed"] = (
             correlation_grid(given["correlation"])
         )
     if any(name.startswith("released") for name in given["logs"]["protocol"]):
-        grids[
+        found[
             "What is logged while training, mean over seeds [least, greatest]: the moving average over 20 iterations; "
             "the last column is the standard deviation of the torques at the end. Published runs of the same cells "
             "below"
         ] = logs_grid(given["logs"], training_logs)
     if "agreement" in given:
         said.append(agreement_sentence(given["agreement"]))
-        grids["Beside Stable-Baselines3 with the same settings: means, and Welch's interval of the difference"] = (
+        found["Beside Stable-Baselines3 with the same settings: means, and Welch's interval of the difference"] = (
             agreement_grid(given["agreement"])
         )
     shaped = given["comparisons"][given["comparisons"]["family"] == "none"]
     if "effects" not in given and len(shaped):
         said.append(shaping_sentence(shaped))
-        grids["Paired differences to none: mean over seeds [95 % interval]; bold p would be below 0.05"] = shaping_grid(
+        found["Paired differences to none: mean over seeds [95 % interval]; bold p would be below 0.05"] = shaping_grid(
             shaped
         )
-    grids["Every cell, mean over seeds [95 % interval]"] = cells_grid(given["cells"])
+    found["Every cell, mean over seeds [95 % interval]"] = cells_grid(given["cells"])
     title = TITLES.get(name, protocol_label(name).capitalize())
     shown = [figure for figure in figures if figure.startswith(f"{name}_")]
-    return Section(name, title, INTROS.get(name, ""), [text for text in said if text], grids, shown)
+    return Section(name, title, INTROS.get(name, ""), [text for text in said if text], found, shown)
+
+
+def to_markdown(section: Section) -> str:
+    """The section's words and tables for a notebook."""
+    parts = [f"## {section.title}", section.intro, *section.sentences]
+    parts += [f"{caption}:\n\n{grids.to_markdown(grid)}" for caption, grid in section.grids.items()]
+    return "\n\n".join(part for part in parts if part)
 
 
 def _interval(row: Mapping[Any, Any], name: str, low: str, high: str, digits: int, factor: float = 1.0) -> str:

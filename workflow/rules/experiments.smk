@@ -1,5 +1,9 @@
 # The further studies of config.yaml, each an optional target of its name: `snakemake attribution`. Once made, they are
 # part of the report.
+from reacher_shaping.views import NAMES as VIEWS
+from reacher_shaping.views import views
+
+
 def of_experiment(make):
     """A param or input made of the cells and seeds of the experiment named by the wildcard."""
     return lambda wildcards: make(EXPERIMENTS[wildcards.experiment], STUDY.experiments[wildcards.experiment].seeds)
@@ -22,17 +26,9 @@ def peers_of(experiment):
 
 
 def views_of(experiment):
-    """Names of an experiment's figures: what its cells can show."""
-    cells = EXPERIMENTS[experiment]
-    views = {
-        "cells": True,
-        "effects": STUDY.experiments[experiment].switches,
-        "log": STUDY.experiments[experiment].grid
-        and any(cell.protocol.log.episode_return == "released" for cell in cells),
-        "correlation": len({cell.alpha0 for cell in cells if cell.variant.name == "none"}) > 1,
-        "forest": {row.protocol for row in STUDY.experiments[experiment].grid if len(row.variants) > 2} and "none",
-    }
-    return [view for view, shown in views.items() if shown]
+    """Names of an experiment's figures."""
+    keys = [cell.key for cell in EXPERIMENTS[experiment]]
+    return views(keys, switches=STUDY.experiments[experiment].switches is not None)
 
 
 def figures_of(experiment):
@@ -59,7 +55,7 @@ MAIN_CORRELATION = [path for path in ["results/correlation.csv"] if Path(path).e
 
 wildcard_constraints:
     experiment="|".join(EXPERIMENTS) or "none",
-    view="cells|effects|log|correlation|forest",
+    view="|".join(VIEWS),
 
 
 use rule aggregate_runs as aggregate_experiment with:
@@ -171,7 +167,7 @@ rule compare_with_peers:
 
 rule plot_experiment:
     input:
-        unpack(lambda wildcards: tables_of(wildcards.experiment)),
+        lambda wildcards: tables_of(wildcards.experiment).values(),
         training_logs=source("report/published/training_logs.csv"),
         main=MAIN_CORRELATION,
     output:

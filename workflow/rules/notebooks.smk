@@ -6,6 +6,7 @@ NOTEBOOKS = expand("results/notebooks/{notebook}.ipynb", notebook=NOTEBOOK_SOURC
 rule run_notebook:
     input:
         TABLES,
+        MADE_TABLES,
         **PUBLISHED,
         source=lambda wildcards: NOTEBOOK_SOURCES[wildcards.notebook],
     output:

@@ -1,0 +1,49 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Protocols
+#
+# Why the published numbers look as they do, and what other settings give: the further studies that have been run.
+
+# %% tags=["parameters"]
+results = "results"
+published = "report/published"
+protocol = "paper"
+
+# %%
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import SVG, Markdown, display
+
+from reacher_shaping import artifacts, experiment_figures, experiment_report, style, views
+
+folder = Path(results)
+
+# %%
+paths = [path for path in sorted(folder.glob("experiments/*/*")) if path.suffix in (".parquet", ".csv")]
+experiments = experiment_report.read(map(str, paths))
+training_logs = pd.read_csv(Path(published) / "training_logs.csv")
+main = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
+
+# %%
+if not experiments:
+    display(Markdown("No further study has been run; `snakemake released attribution standard tuned` does it."))
+
+# %%
+for name, tables in experiments.items():
+    display(Markdown(experiment_report.to_markdown(experiment_report.section(name, tables, [], training_logs))))
+    keys = tables["cells"].to_dict("records")
+    for view in views.views(keys, switches="effects" in tables):
+        figure = experiment_figures.draw(view, tables, training_logs, main)
+        display(SVG(style.to_bytes(figure, "svg")))
