@@ -48,6 +48,7 @@ rule all:
         NOTEBOOKS,
         MEDIA,
         "results/check.txt",
+        [path for name in MADE for path in runs_of(name)],
         MADE_FIGURES,
         "report/report.html",
         CRATE,

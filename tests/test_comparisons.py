@@ -167,3 +167,12 @@ def test_a_study_without_the_papers_cells_has_no_lottery():
 
 def test_the_frames_use_columns_of_runs():
     assert set(comparisons.METRICS) <= set(aggregate.RUNS)
+
+
+def test_baseline_with_the_same_label_is_the_partner_where_there_is_one():
+    cells = pd.DataFrame(
+        [("p", "none", 100, 1.0), ("p", "none", 100, 0.5), ("q", "none", 100, 1.0)], columns=comparisons.KEY
+    )
+    shaped = {"protocol": "p", "variant": "l2", "budget": 100, "alpha0": 0.5}
+    assert comparisons.partner("none", shaped, cells)["alpha0"] == 0.5
+    assert comparisons.partner("none", shaped | {"protocol": "q"}, cells)["alpha0"] == 1.0

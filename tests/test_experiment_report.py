@@ -11,8 +11,8 @@ from reacher_shaping import comparisons, experiment_figures, experiment_report, 
 from reacher_shaping.style import to_bytes
 
 LOGS = pd.DataFrame(
-    [{"run": "none_seed0", "variant": "none", "budget": 500_000, "peak_return": -38.6, "peak_iteration": 33,
-      "final_return": -87.2, "std_1": 0.4, "std_2": 0.54}]
+    [{"run": "none_seed0", "protocol": "released", "variant": "none", "budget": 500_000, "peak_return": -38.6,
+      "peak_iteration": 33, "final_return": -87.2, "std_1": 0.4, "std_2": 0.54}]
 )  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def released():
 
 @pytest.fixture(scope="module")
 def section(released):
-    return experiment_report.section("released", released, ["released_log", "figure_1"], LOGS)
+    return experiment_report.section("released", released, LOGS, synthetic.correlation())
 
 
 def test_effects_figure_has_each_difference_with_its_interval(effects):
@@ -66,7 +66,8 @@ def test_cells_figure_has_a_dot_per_run_in_every_panel(released):
         dots = [x for line in axes.lines if line.get_label() == "_runs" for x in line.get_xdata()]
         assert sorted(dots) == pytest.approx(sorted(released["runs"][metric]))
     ceilings = [line.get_xdata()[0] for axes in figure.axes for line in axes.lines if line.get_label() == "_controller"]
-    assert ceilings == [1.0, 1.0, -3.7]
+    rows = (released["cells"]["protocol"] == "released").sum()  # the other protocol has no controllers here
+    assert sorted(ceilings) == sorted([1.0, 1.0, -3.7] * rows)
     without = experiment_figures.cells(released["runs"], released["cells"])
     assert not [line for axes in without.axes for line in axes.lines if line.get_label() == "_controller"]
 
@@ -84,13 +85,12 @@ def test_log_figure_sets_the_published_peak_and_end_beside_the_curve_of_the_same
     assert marks[0] in figure.axes[0].lines
 
 
-def test_correlation_figure_has_a_panel_each_for_the_published_ours_and_the_main_study(released):
-    titles = [axes.get_title(loc="left") for axes in experiment_figures.correlation(released["correlation"]).axes[:2]]
+def test_correlation_figure_has_a_panel_each_for_the_published_and_ours(released):
+    figure = experiment_figures.correlation(released["correlation"])
+    titles = [axes.get_title(loc="left") for axes in figure.axes[:2]]
     assert titles == ["Published Table 2", "Released code, labels as published"]
-    figure = experiment_figures.correlation(released["correlation"], synthetic.correlation())
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert any(text.startswith("0.91") for text in texts)
-    assert len(figure.axes) == 4  # three panels and the colours
 
 
 def test_section_tells_the_correlation_beside_the_published_one(section):
@@ -100,11 +100,12 @@ def test_section_tells_the_correlation_beside_the_published_one(section):
     said = " ".join(section.sentences)
     assert row[1] in said
     assert row[2] in said
-    assert section.figures == ["released_log"]
+    assert row[-1].startswith("0.91 [")  # of the main study, made up
+    assert section.figures == ["released_cells", "released_log", "released_correlation", "released_forest"]
 
 
 def test_section_lists_our_logs_and_then_the_published_one(section):
-    grid = section.grids[next(name for name in section.grids if name.startswith("What is logged"))]
+    grid = section.grids[next(name for name in section.grids if "own log" in name)]
     rows = [[entry.replace("\N{MINUS SIGN}", "-") for entry in row] for row in grid.rows]
     assert rows[0][:4] == ["released", "none", "500K, α₀ = 1", "31 [30, 32]"]
     assert rows[0][4:] == ["-41.0 [-42.0, -40.0]", "-90.0 [-90.0, -90.0]", "0.45 [0.45, 0.45]"]
@@ -114,7 +115,7 @@ def test_section_lists_our_logs_and_then_the_published_one(section):
 
 def test_section_of_switches_names_the_largest_effect_and_the_interactions(released, effects):
     given = {**released, "effects": effects}
-    text = " ".join(experiment_report.section("attribution", given, [], LOGS).sentences)
+    text = " ".join(experiment_report.section("attribution", given, LOGS).sentences)
     assert "success, any step: a: epochs 10 to 5 (none, as the last one, to the end), 0.200 [0.200, 0.200]" in text
     assert (
         "What a switch does depends on the others beyond chance for a on" not in text
@@ -138,12 +139,14 @@ def test_section_counts_the_differences_that_survive_holm(released):
     shaped = released["comparisons"][released["comparisons"]["family"] == "none"].copy()
     shaped["p_holm"] = np.where(shaped["metric"] == "final_distance", 0.01, 0.5)
     shaped.loc[shaped["metric"] == "final_distance", "difference"] = -0.01
-    text = experiment_report.shaping_sentence(shaped)
-    assert "distance at the last step (mm) in 2 of 2 (2 for the better)" in text
-    assert "success, any step in 0 of 2," in text
+    few = experiment_report.shaping_sentence(shaped)
+    assert few == "With 3 seeds no difference between 2 shaped cells and none can be told from chance."
+    text = experiment_report.shaping_sentence(shaped.assign(seeds=10))
+    assert "distance at the last step (mm) in 4 of 4 (4 for the better)" in text
+    assert "success, any step in 0 of 4," in text
 
 
 def test_unknown_experiment_has_a_section_too(released):
-    section = experiment_report.section("my_study", released, [], None)
+    section = experiment_report.section("my_study", released, LOGS)
     assert (section.title, section.intro) == ("My study", "")
     assert section.grids

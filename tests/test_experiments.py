@@ -88,6 +88,13 @@ def test_effect_without_its_cells_is_left_out():
     assert experiments.effects_frame(runs(MEANS, budget=8192), SWITCHES, PROTOCOLS, 0).empty
 
 
+def test_a_cell_of_another_weight_is_no_part_of_an_effect():
+    table = runs(MEANS)
+    other = table[table["protocol"] == "late"].assign(alpha0=3.0, success_rate=0.99)
+    frame = experiments.effects_frame(pd.concat([table, other]), SWITCHES, PROTOCOLS, 0)
+    assert effect(frame, "all", "all")["difference"] == pytest.approx(0.30)
+
+
 def test_diverged_run_leaves_its_effects_only():
     table = runs(MEANS)
     table.loc[(table["protocol"] == "late_without_a") & (table["seed"] == 2), "success_rate"] = np.nan

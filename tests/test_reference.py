@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import synthetic
 
-from reacher_shaping import artifacts, bars, reference, style, tables
+from reacher_shaping import artifacts, bars, reference, style, tables, views
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "report" / "reference"
@@ -90,13 +90,17 @@ def test_further_studies_that_were_made_are_kept(tmp_path):
     artifacts.write_table(results / "experiments/mine/logs.parquet", logs, artifacts.LOGS)
     shutil.copy(KEPT / "curves.parquet", results / "experiments/mine/logged.parquet")
     (kept / "experiments" / "old").mkdir(parents=True)
-    assert reference.keep_experiments(results, kept, ["mine", "yours"]) == ["mine"]
+    files = views.table_files(switches=False, peers=False)
+    assert reference.keep_experiments(results, kept, {"mine": files, "yours": files}) == ["mine"]
     assert [folder.name for folder in (kept / "experiments").iterdir()] == ["mine"]
-    names = {path.name for path in (kept / "experiments" / "mine").iterdir()}
-    assert names == reference.EXPERIMENT_TABLES.keys() - {"effects.csv", "agreement.csv"}
-    (results / "experiments/mine/logs.parquet").unlink()
+    assert {path.name for path in (kept / "experiments" / "mine").iterdir()} == set(files)
+    damaged = results / "experiments/mine/logs.parquet"
+    damaged.write_bytes(b"PAR1")
     with pytest.raises(artifacts.ArtifactError, match=r"logs\.parquet"):
-        reference.keep_experiments(results, kept, ["mine"])
+        reference.keep_experiments(results, kept, {"mine": files})
+    assert (kept / "experiments/mine/logs.parquet").exists()  # what was kept stays until all is read
+    damaged.unlink()
+    assert reference.keep_experiments(results, kept, {"mine": files}) == []
 
 
 def test_run_that_lacks_a_table_cannot_be_the_reference(tmp_path):

@@ -78,7 +78,7 @@ def test_diverged_trial_counts_as_the_worst_and_does_not_stop_the_search():
 
 def test_a_trial_trains_the_protocol_with_its_own_settings_under_its_own_root():
     values = {"ppo.learning_rate": 0.002, "ppo.epochs": 3, "ppo.minibatch_size": 32, "alpha0": 2.0}
-    cell = search.cell_of(SPEC, PROTOCOL, L2, values)
+    cell = SPEC.cell(PROTOCOL, L2, values)
     expected = PPO(learning_rate=0.002, epochs=3, minibatch_size=32, learning_rate_schedule="linear")
     assert cell.protocol.ppo == expected
     assert (cell.alpha0, cell.budget, cell.root_seed, cell.variant) == (2.0, 4096, 5, L2)
@@ -86,13 +86,13 @@ def test_a_trial_trains_the_protocol_with_its_own_settings_under_its_own_root():
 
 def test_impossible_trial_is_one_line():
     with pytest.raises(ConfigError, match=r"minibatch_size = 30 must divide rollout_steps = 2048") as caught:
-        search.cell_of(SPEC, PROTOCOL, L2, {"ppo.minibatch_size": 30})
+        SPEC.cell(PROTOCOL, L2, {"ppo.minibatch_size": 30})
     assert "\n" not in str(caught.value)
 
 
 def test_score_is_the_mean_over_seeds_of_real_runs():
     settings = PPO(rollout_steps=192, epochs=1, minibatch_size=32)
-    cell = search.cell_of(SPEC, Protocol(name="standard", ppo=settings), L2, {}).model_copy(update={"budget": 384})
+    cell = SPEC.cell(Protocol(name="standard", ppo=settings), L2, {}).model_copy(update={"budget": 384})
     found = search.score(cell, 2, episodes=50, radius=0.05)
     assert found == search.score(cell, 2, episodes=50, radius=0.05)
     assert set(found) == set(search.MEASURES)

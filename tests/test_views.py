@@ -13,12 +13,12 @@ def keys(*cells):
 @pytest.mark.parametrize(
     ("cells", "switches", "expected"),
     [
-        (keys(("paper", "none", 1.0)), False, ["cells"]),
+        (keys(("paper", "none", 1.0)), False, ["cells", "log"]),
         (keys(("paper", "none", 1.0), ("released_late_without_d1", "none", 1.0)), True, ["cells", "effects"]),
-        (keys(("released", "none", 1.0), ("released", "l2", 1.0)), False, ["cells", "log"]),
-        (keys(("late", "none", 1.0), ("late", "none", 0.5)), False, ["cells", "correlation"]),
-        (keys(*(("standard", name, 1.0) for name in ("none", "l2", "l2sq"))), False, ["cells", "forest"]),
-        (keys(*(("standard", name, 1.0) for name in ("l2sq", "l2", "decay"))), False, ["cells"]),
+        (keys(("released", "none", 1.0), ("released", "l2", 3.0)), False, ["cells", "log"]),
+        (keys(("late", "none", 1.0), ("late", "none", 0.5)), False, ["cells", "log", "correlation"]),
+        (keys(*(("standard", name, 1.0) for name in ("none", "l2", "l2sq"))), False, ["cells", "log", "forest"]),
+        (keys(*(("standard", name, 1.0) for name in ("l2sq", "l2", "decay"))), False, ["cells", "log"]),
     ],
 )
 def test_views_follow_from_the_cells(cells, switches, expected):
@@ -34,6 +34,6 @@ def test_the_studies_of_the_configuration_have_theirs():
     assert found == {
         "released": ["cells", "log", "correlation", "forest"],
         "attribution": ["cells", "effects"],
-        "standard": ["cells", "forest"],
+        "standard": ["cells", "log", "forest"],
         "tuned": ["cells", "effects"],
     }

@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from snakemake.utils import update_config
 
 from reacher_shaping import artifacts, reference, tables
 from reacher_shaping.cell import Cell
 from reacher_shaping.config import block_name, load_study, require_mapping, settings_hash
+from reacher_shaping.views import table_files
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
@@ -27,17 +29,22 @@ def manifests(cells: Iterable[Cell], blocks: Iterable[range]) -> list[dict[str, 
 
 
 def main() -> None:
-    overlay = require_mapping(sys.argv[1]) if len(sys.argv) > 1 else {}
-    study = load_study({**require_mapping("config.yaml"), **overlay})
+    settings = dict(require_mapping("config.yaml"))
+    update_config(settings, require_mapping(sys.argv[1]) if len(sys.argv) > 1 else {})
+    study = load_study(settings)
     blocks = manifests(study.cells, study.blocks())
     reference.keep_tables(RESULTS, KEPT)
-    made = reference.keep_experiments(RESULTS, KEPT, list(study.experiments))
+    files = {
+        name: table_files(switches=own.switches is not None, peers=own.peers is not None)
+        for name, own in study.experiments.items()
+    }
+    made = reference.keep_experiments(RESULTS, KEPT, files)
     further = {
         name: manifests(study.experiment_cells[name], study.blocks(study.experiments[name].seeds)) for name in made
     }
-    settings = study.model_dump(mode="json")
+    resolved = study.model_dump(mode="json")
     peers = [artifacts.read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
-    record = reference.manifest(settings, settings_hash(study), blocks, further, peers)
+    record = reference.manifest(resolved, settings_hash(study), blocks, further, peers)
     artifacts.write_json(KEPT / "manifest.json", record)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 

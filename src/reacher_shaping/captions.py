@@ -84,6 +84,36 @@ TEXTS = {
     "interval. Dashed: none of the same budget where a setting has none of its own.",
 }
 
+# Figures of the further studies, by the last part of their names.
+VIEWS = {
+    "cells": (
+        "Every run",
+        "Every run of every protocol: a dot per seed, the bar is the mean and the line its 95 % interval; returns are "
+        "those of each protocol's own reward. Dotted: the controller that solves the task by inverse kinematics, under "
+        "that reward. An axis with returns below \N{MINUS SIGN}150 is logarithmic beyond 10.",
+    ),
+    "effects": (
+        "What each switch does",
+        "Differences on common seeds, mean and 95 % interval, filled where it leaves zero out: a switch alone from the "
+        "start, as the last one to the end, and all together. Returns are taken at control weight 1, whatever a "
+        "protocol trained with; their axis is logarithmic beyond 10 where they spread that far.",
+    ),
+    "log": (
+        "Training as logged",
+        "What each protocol's own log shows, mean over seeds. Diamonds: peak and end of the published logs of the same "
+        "cell, their moving average over 20 iterations. Curves that collapse leave the scale.",
+    ),
+    "correlation": (
+        "The labels' correlations",
+        "Pearson's correlation over the published cells and over these, with the labels as published and 95 % "
+        "bootstrap intervals.",
+    ),
+    "forest": (
+        "Differences to none",
+        "Paired differences in success to none of the same budget, on common seeds: mean and 95 % interval.",
+    ),
+}
+
 # What to say of runs that diverged, and the groups of variants whose runs it counts.
 _MAIN, _APPENDIX = ("none", "constant", "decay"), ("decay_l2sq",)
 _IN_CURVES = "{count} of these {runs} runs diverged: past its last finite return a run is no longer in the mean."
@@ -106,6 +136,9 @@ DIVERGED = {
 def title(stem: str) -> str:
     """`figure_1` as `Figure 1. Training curves`; a figure the paper does not have is named without a number."""
     kind, _, number = stem.partition("_")
+    view = _view(stem)
+    if view:
+        return f"{view[0]} of the study “{stem.rpartition('_')[0].replace('_', ' ')}”"
     name = TITLES.get(stem, stem.replace("_", " ").capitalize())
     return f"{kind.capitalize()} {number}. {name}" if kind in ("figure", "table") and number.isdigit() else name
 
@@ -114,7 +147,7 @@ def caption(stem: str, cells: pd.DataFrame, runs: pd.DataFrame | None = None, pr
     """The caption of a figure or table, with the counts of seeds and episodes found in the tables."""
     ours = of_protocol(cells, protocol)
     episodes = sorted(runs["episodes"].unique()) if runs is not None else []
-    text = TEXTS.get(stem, "").format(
+    text = (TEXTS.get(stem) or (_view(stem) or ("", ""))[1]).format(
         seeds=_count(sorted(ours["seeds"].unique()), "seed"),
         episodes=" to ".join(f"{count:,}" for count in (episodes[:1] + episodes[1:][-1:])) or "the",
         interval=" or ".join(sorted(ours["interval"].unique())),
@@ -123,6 +156,11 @@ def caption(stem: str, cells: pd.DataFrame, runs: pd.DataFrame | None = None, pr
         burn_in=f"{100 * BURN_IN:g} %",
     )
     return f"{text} {_divergence(stem, ours)}".strip()
+
+
+def _view(stem: str) -> tuple[str, str] | None:
+    """Title and text of a further study's figure, by its name."""
+    return VIEWS.get(stem.rpartition("_")[2])
 
 
 def _divergence(stem: str, cells: pd.DataFrame) -> str:

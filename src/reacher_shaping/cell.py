@@ -13,6 +13,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
+EPISODE_STEPS = 50
+"""Environment steps of an episode of Reacher-v5; the simulation's own constant, which would load MuJoCo."""
+
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$", max_length=40)]
 Count = Annotated[int, Field(ge=1, le=10**12)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -81,6 +84,11 @@ class PPO(Settings):
     def _minibatches_fill_the_rollout(self) -> Self:
         if self.rollout_steps % self.minibatch_size:
             raise ValueError(f"minibatch_size = {self.minibatch_size} must divide rollout_steps = {self.rollout_steps}")
+        if self.advantage_normalisation == "minibatch" and self.minibatch_size < 2:
+            raise ValueError(
+                f"minibatch_size = {self.minibatch_size} has no deviation to normalise by; allowed: >= 2, or "
+                "advantage_normalisation = 'rollout'"
+            )
         return self
 
 
@@ -108,6 +116,15 @@ class Protocol(Settings):
     ppo: PPO = PPO()
     shaping: Shaping = Shaping()
     log: Log = Log()
+
+    @model_validator(mode="after")
+    def _there_is_something_to_log(self) -> Self:
+        if self.log.episode_return == "released" and self.ppo.rollout_steps < EPISODE_STEPS:
+            raise ValueError(
+                f"log.episode_return = 'released' needs a whole episode in a rollout; ppo.rollout_steps = "
+                f"{self.ppo.rollout_steps}; allowed: >= {EPISODE_STEPS}"
+            )
+        return self
 
 
 class Variant(Settings):

@@ -23,8 +23,8 @@ from reacher_shaping import learning, stats
 from reacher_shaping.aggregate import KEY, Block, curve_array, generator
 
 METRICS = ("success_rate", "mean_return", "final_success_rate", "final_distance")
-SPEED = ("area_under_curve", "steps_to_threshold")
-"""Measures of learning speed, compared in the further studies."""
+SPEED = ("area_under_curve",)
+"""Learning speed, compared in the further studies. Steps to a threshold would leave out runs that never get there."""
 FAMILIES = ("none", "constant", "longer", "half")
 
 
@@ -32,7 +32,9 @@ def partner(family: str, key: Mapping[str, Any], cells: pd.DataFrame) -> dict[st
     """Key of the cell that `key` is compared with in a family; None if it takes no part. May not exist."""
     own, variant = dict(key), str(key["variant"])
     if family == "none" and variant != "none":
-        return own | {"variant": "none", "alpha0": 1.0}
+        labelled = own | {"variant": "none"}  # where alpha0 is a label, the baseline has it too
+        there = (cells[KEY] == pd.Series(labelled)).all(axis=1).any()
+        return labelled if there else labelled | {"alpha0": 1.0}
     if family == "constant" and variant.startswith("decay"):
         return own | {"variant": "l2sq" if variant.endswith("_l2sq") else "l2"}
     if family == "half" and key["alpha0"] == 0.5:
@@ -66,7 +68,7 @@ def comparison_frame(runs: pd.DataFrame, root_seed: int, metrics: Sequence[str] 
             for metric in metrics:
                 random = generator(root_seed, family, *key.values(), metric)
                 compared = _compare(
-                    ours[metric], theirs[metric], random, better=-1 if metric.endswith(("distance", "threshold")) else 1
+                    ours[metric], theirs[metric], random, better=-1 if metric.endswith("distance") else 1
                 )
                 rows.append({"family": family, "metric": metric} | key | named | compared)
     columns = ["family", "metric", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED]

@@ -32,6 +32,7 @@ from reacher_shaping.cell import (
     short,
 )
 
+RESERVED_TARGETS = frozenset({"all", "peers", "search"})
 RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
 
 
@@ -40,6 +41,19 @@ class Evaluation(Settings):
 
     episodes: Annotated[int, Field(ge=1, le=10**6)] = 1000
     radius: Positive = 0.02
+
+
+PEER_PPO: dict[str, Any] = {
+    "learning_rate_schedule": "constant",
+    "ratio_pairs": "sample",
+    "advantage_normalisation": "minibatch",
+    "adam_epsilon": 1e-5,
+    "hidden_units": 64,
+    "networks": "separate",
+    "initialisation": "orthogonal",
+    "initial_log_std": 0.0,
+}
+"""What Stable-Baselines3's PPO has for the settings that are not handed over to it (`peers.train`)."""
 
 
 class Peers(Settings):
@@ -59,6 +73,7 @@ class Row(Settings):
     environment: dict[str, Any] = Field(default_factory=dict)
     ppo: dict[str, Any] = Field(default_factory=dict)
     shaping: dict[str, Any] = Field(default_factory=dict)
+    log: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod
@@ -145,6 +160,38 @@ class Search(Settings):
     fixed: dict[str, bool | int | float | str] = Field(default_factory=dict)
     space: Annotated[dict[str, Range | Choices], Field(min_length=1)]
 
+    def corners(self) -> list[dict[str, Any]]:
+        """The settings at the lower and at the upper end of the whole space."""
+        ends = {
+            path: (own.choices[0], own.choices[-1]) if isinstance(own, Choices) else (own.low, own.high)
+            for path, own in self.space.items()
+        }
+        return [{path: pair[end] for path, pair in ends.items()} for end in (0, 1)]
+
+    def cell(self, protocol: Protocol, variant: Variant, values: Mapping[str, Any]) -> Cell:
+        """The cell that a trial trains: `protocol` and alpha0 = 1 but for what is fixed and for `values`.
+
+        Raises ConfigError where they make no cell.
+        """
+        settings = {**self.fixed, **values}
+        changed = protocol.model_dump()
+        for path, value in settings.items():
+            part, _, key = path.partition(".")
+            if path != "alpha0" and (not isinstance(changed.get(part), Mapping) or key not in changed[part]):
+                raise ConfigError(f"search: {path!r} is no setting; allowed: alpha0, or such as 'ppo.discount'")
+            if key:
+                changed[part][key] = value
+        try:
+            return Cell(
+                protocol=Protocol.model_validate(changed),
+                variant=variant,
+                budget=self.budget,
+                alpha0=settings.get("alpha0", 1.0),
+                root_seed=self.root_seed,
+            )
+        except ValidationError as error:
+            raise ConfigError(f"search: a trial with {settings}: {first_problem(error)}") from None
+
 
 def _named(entries: Any) -> Any:
     """Give each entry of a mapping its key as `name`."""
@@ -179,6 +226,10 @@ class Study(Settings):
         for name in self.protocols:
             if name in RESERVED_FOLDERS:
                 raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
+        for name, experiment in self.experiments.items():
+            if name in RESERVED_TARGETS:
+                raise ValueError(f"experiments: {name!r} is the name of another target; allowed: any other name")
+            self._peers_have_partners(name, experiment)
         self._search_is_possible()
         known: dict[str, Cell] = {}
         for where, cells in {"grid": self.cells, **self.experiment_cells}.items():
@@ -195,21 +246,39 @@ class Study(Settings):
                     )
         return self
 
-    def _search_is_possible(self) -> None:
-        search = self.search
-        if search is None:
+    def _peers_have_partners(self, name: str, experiment: Experiment) -> None:
+        """Peers are held against the unshaped cells of the experiment's first protocol, and have its settings."""
+        if experiment.peers is None:
             return
-        for key, value, known in (
-            ("protocol", search.protocol, self.protocols),
-            ("variant", search.variant, self.variants),
-        ):
-            if value not in known:
+        cells = self.experiment_cells[name]
+        protocol = cells[0].protocol
+        budgets = {cell.budget for cell in cells if cell.protocol == protocol and cell.variant.name == "none"}
+        for algorithm, budget in experiment.peers.budgets.items():
+            if budget not in budgets:
+                raise ValueError(
+                    f"experiments.{name}.peers.budgets.{algorithm} = {budget} has no cell beside it; allowed: a budget "
+                    f"of `none` under {protocol.name}: {', '.join(map(str, sorted(budgets))) or 'there is none'}"
+                )
+        for key, value in PEER_PPO.items():
+            ours = getattr(protocol.ppo, key)
+            if "ppo" in experiment.peers.budgets and ours != value:
+                raise ValueError(
+                    f"experiments.{name}.peers: Stable-Baselines3's PPO has {key} = {value!r}, the protocol "
+                    f"{protocol.name} {ours!r}; allowed: a protocol that has the same"
+                )
+
+    def _search_is_possible(self) -> None:
+        if self.search is None:
+            return
+        for key, known in (("protocol", self.protocols), ("variant", self.variants)):
+            if getattr(self.search, key) not in known:
+                value = getattr(self.search, key)
                 raise ValueError(f"search.{key} = {value!r} is unknown; allowed: {', '.join(known)}")
-        settings = self.protocols[search.protocol].model_dump()
-        for path in search.space:
-            part, _, key = path.partition(".")
-            if path != "alpha0" and (not isinstance(settings.get(part), Mapping) or key not in settings[part]):
-                raise ValueError(f"search: {path!r} is no setting; allowed: alpha0, or such as 'ppo.discount'")
+        for values in self.search.corners():
+            try:
+                self.search.cell(self.protocols[self.search.protocol], self.variants[self.search.variant], values)
+            except ConfigError as error:
+                raise ValueError(str(error)) from None
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
@@ -238,17 +307,20 @@ class Study(Settings):
                     continue
                 name = f"{base['name']}_{word}_{switch}"
                 protocols.append(_switched(base, other, paths, f"{where}.settings.{switch}") | {"name": name})
-        return tuple(
-            self._cell(
-                Protocol.model_validate(protocol),
-                variant,
-                switches.budget,
-                1.0 if variant == "none" else switches.alpha0,
-                where,
+        try:
+            return tuple(
+                self._cell(
+                    Protocol.model_validate(protocol),
+                    variant,
+                    switches.budget,
+                    1.0 if variant == "none" else switches.alpha0,
+                    where,
+                )
+                for protocol in protocols
+                for variant in switches.variants
             )
-            for protocol in protocols
-            for variant in switches.variants
-        )
+        except ValidationError as error:
+            raise ValueError(f"{where}.{first_problem(error)}") from None
 
     def _cell(self, protocol: Protocol, variant: str, budget: int, alpha0: float, where: str) -> Cell:
         if variant not in self.variants:
@@ -264,7 +336,7 @@ class Study(Settings):
         if row.protocol not in self.protocols:
             raise ValueError(f"{where}.protocol = {row.protocol!r} is unknown; allowed: {', '.join(self.protocols)}")
         protocol = self.protocols[row.protocol].model_dump()
-        for part in ("environment", "ppo", "shaping"):
+        for part in ("environment", "ppo", "shaping", "log"):
             protocol[part] |= getattr(row, part)
         try:
             changed = Protocol.model_validate(protocol)

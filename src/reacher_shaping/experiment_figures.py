@@ -17,7 +17,6 @@ from reacher_shaping.style import (
     STYLE,
     cell_order,
     empty_panel,
-    of_protocol,
     save,
     setting_label,
     stochastic,
@@ -39,14 +38,13 @@ EFFECT_LABELS = {
     "final_distance": "Distance at the last step (m)",
 }
 WIDE = 150
+"""Return beyond which an axis becomes logarithmic; ten times what a policy that reaches its target gets."""
 KINDS = {"alone": "alone, from the start", "last": "as the last one, to the end", "all": "all together"}
 MARKERS = {"alone": "o", "last": "s", "all": "D"}
 
 
-def draw(
-    view: str, tables: Mapping[str, pd.DataFrame], training_logs: pd.DataFrame, main: pd.DataFrame | None = None
-) -> Figure:
-    """The figure of that name (`views.NAMES`) from an experiment's tables; `main`: the main study's correlations."""
+def draw(view: str, tables: Mapping[str, pd.DataFrame], training_logs: pd.DataFrame) -> Figure:
+    """The figure of that name (`views.VIEWS`) from an experiment's tables."""
     if view == "cells":
         return cells(tables["runs"], tables["cells"], tables["controllers"])
     if view == "effects":
@@ -54,7 +52,7 @@ def draw(
     if view == "log":
         return log(tables["logged"], training_logs)
     if view == "correlation":
-        return correlation(tables["correlation"], main)
+        return correlation(tables["correlation"])
     return forest(tables["comparisons"])
 
 
@@ -74,22 +72,24 @@ def switch_label(row: Mapping[Any, Any]) -> str:
 def cells(runs: pd.DataFrame, table: pd.DataFrame, controllers: pd.DataFrame | None = None) -> Figure:
     """A row per cell of all protocols, a panel per measure: a dot per run, a bar at the mean with its interval.
 
-    A dotted line stands at the controller that solves the task, under the first protocol.
+    A dotted line stands at the controller that solves the task, under the protocol of the row.
     """
     order = list(dict.fromkeys(runs["protocol"]))
     rows = sorted(table.to_dict("records"), key=lambda row: (order.index(row["protocol"]), *cell_order(row)))
     figure = Figure(figsize=(11.0, 1.4 + 0.27 * max(len(rows), 4)))
     panels = figure.subplots(1, len(STRIP), sharey=True)
     by_cell = dict(iter(runs.groupby(["protocol", *further.CELL])))
-    ceiling = _controller(controllers, order[0] if order else None)
+    ceilings = {protocol: _controller(controllers, protocol) for protocol in order}
     for axes, (metric, label) in zip(panels, STRIP.items(), strict=True):
         for y, row in enumerate(rows):
             own = by_cell[tuple(row[name] for name in ("protocol", *further.CELL))]
             further.draw_runs(axes, y, own, row, metric, variant_color(row["variant"]))
+            ceiling = ceilings[row["protocol"]]
+            if metric in ceiling:
+                look = {"color": "#555555", "linestyle": ":", "linewidth": 1.2, "label": "_controller"}
+                axes.plot([ceiling[metric]] * 2, [y - 0.5, y + 0.5], **look)
             if order.index(row["protocol"]) % 2 == 0:
                 axes.axhspan(y - 0.5, y + 0.5, color="#F3F5F7", linewidth=0, zorder=0)
-        if metric in ceiling:
-            axes.axvline(ceiling[metric], color="#555555", linestyle=":", linewidth=1.2, label="_controller")
         if metric.endswith("rate"):
             axes.xaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))
         _compress(axes)
@@ -113,7 +113,7 @@ def _compress(axes: Axes) -> None:
         axes.set_xscale("symlog", linthresh=10)
 
 
-def _controller(controllers: pd.DataFrame | None, protocol: str | None) -> dict[str, float]:
+def _controller(controllers: pd.DataFrame | None, protocol: str) -> dict[str, float]:
     """Measures of the inverse-kinematics controller under a protocol, if the table has it."""
     if controllers is None or controllers.empty:
         return {}
@@ -211,7 +211,8 @@ def log(logged: pd.DataFrame, training_logs: pd.DataFrame) -> Figure:
             )
         if part["episode_return"].min() < floor:
             axes.set_ylim(bottom=floor)
-        theirs = training_logs[(training_logs["budget"] == setting[1]) & (setting[2] == 1)]
+        same = (training_logs["protocol"] == setting[0]) & (training_logs["budget"] == setting[1])
+        theirs = training_logs[same & (setting[2] == 1)]
         for run in theirs.to_dict("records"):
             last = int(part["iteration"].max())
             marker = PUBLISHED | {"color": variant_color(run["variant"])}
@@ -220,23 +221,21 @@ def log(logged: pd.DataFrame, training_logs: pd.DataFrame) -> Figure:
         axes.set_xlabel("PPO iteration")
     panels[0].set_ylabel("Logged return")
     handles, labels = panels[0].get_legend_handles_labels()
-    if not training_logs.empty:
+    if any(line.get_label() == "_published" for axes in panels for line in axes.lines):
         handles.append(Line2D([], [], linestyle="none", **PUBLISHED))
         labels.append("published: peak, end")
     figure.legend(handles, labels, loc="outside right center")
     return figure
 
 
-def correlation(table: pd.DataFrame, main: pd.DataFrame | None = None) -> Figure:
-    """The published matrix, the experiment's over its cells, and the main study's if it is there."""
-    frames = {
-        "Published Table 2": table[table["level"] == "published"],
-        "Released code, labels as published": table[table["level"] == "cells"],
-    }
-    if main is not None:
-        ours = of_protocol(main, None)
-        frames["The text's protocol"] = ours[ours["level"] == "cells"]
-    return plots.matrices(frames)
+def correlation(table: pd.DataFrame) -> Figure:
+    """The published matrix and the experiment's over its cells."""
+    return plots.matrices(
+        {
+            "Published Table 2": table[table["level"] == "published"],
+            "Released code, labels as published": table[table["level"] == "cells"],
+        }
+    )
 
 
 def forest(comparisons: pd.DataFrame) -> Figure:

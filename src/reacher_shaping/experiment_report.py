@@ -3,31 +3,18 @@
 Every number comes from the experiment's tables; here they are only chosen, rounded and put into words.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from reacher_shaping import artifacts, grids, tables
+from reacher_shaping import grids, tables, views
 from reacher_shaping.experiment_figures import KINDS, protocol_label, switch_label
 from reacher_shaping.grids import Grid, of_table
-from reacher_shaping.style import budget_label, cell_order, number, setting_label, variant_label
+from reacher_shaping.style import budget_label, cell_order, number, of_protocol, setting_label, variant_label
 
 LEVEL = 0.05
-SCHEMAS = {
-    "runs": artifacts.RUNS,
-    "cells": artifacts.CELLS,
-    "controllers": artifacts.CONTROLLERS,
-    "curves": artifacts.CURVES,
-    "logged": artifacts.CURVES,
-    "logs": artifacts.LOGS,
-    "comparisons": artifacts.COMPARISONS,
-    "correlation": artifacts.CORRELATION,
-    "effects": artifacts.EFFECTS,
-    "agreement": artifacts.AGREEMENT,
-}
 TITLES = {
     "released": "The study as the released code computes it",
     "attribution": "What each departure does",
@@ -40,7 +27,8 @@ INTROS = {
     "recursion whose carry is not stored, so that advantages look one step ahead (D3), a learning rate that changes "
     "with a late commit (D4), a log of the shaped return over the last ten episodes (D5), the potential under a decay "
     "(D6), and a start weight α₀ that is a label: every run starts at 1 (D7). Here the cells of Table 2 are trained as "
-    "that code trains them; the runs labelled 0.5 have the late commit's learning rate. The labels are the published.",
+    "that code trains them, labels as published; the runs labelled 0.5 have the late commit's learning rate and, where "
+    "their weight decays, its potential L2².",
     "attribution": "Both ends and, between them, every switch alone from the text, and taken back alone from the "
     "release. If switches acted independently, the two would agree.",
     "standard": "The same variants under settings that are usual for PPO on this task: a network each for policy and "
@@ -48,7 +36,7 @@ INTROS = {
     "tuned": "PPO and shaping settings searched on seeds of their own, then trained on fresh ones, with the parts of "
     "the change taken back one by one.",
 }
-METRICS = {"success_rate": (3, 1.0), "unit_return": (2, 1.0), "final_distance": (1, 1000.0)}
+METRICS = ("success_rate", "unit_return", "final_distance")
 NAMES = {
     "success_rate": "Success, any step",
     "final_success_rate": "Success, last step",
@@ -60,7 +48,6 @@ NAMES = {
     "deterministic_final_distance": "Distance at the last step, mean action (mm)",
     "unit_return": "Mean return at control weight 1",
     "area_under_curve": "Mean return while training",
-    "steps_to_threshold": "Steps to the threshold (thousands)",
 }
 PAIRS = {
     ("alpha0", "mean_return"): "r(α₀, return)",
@@ -82,34 +69,36 @@ class Section:
     figures: list[str]
 
 
-def read(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
-    """The tables of experiments by experiment and name, from their files. Raises ArtifactError."""
-    found: dict[str, dict[str, pd.DataFrame]] = {}
-    for path in map(Path, paths):
-        found.setdefault(path.parent.name, {})[path.stem] = artifacts.read_table(path, SCHEMAS[path.stem])
-    return found
-
-
 def section(
-    name: str, given: Mapping[str, pd.DataFrame], figures: Iterable[str], training_logs: pd.DataFrame | None
+    name: str,
+    given: Mapping[str, pd.DataFrame],
+    training_logs: pd.DataFrame,
+    main: pd.DataFrame | None = None,
 ) -> Section:
-    """What the report says of one experiment, from its tables and the names of all figures."""
+    """What the report says of one experiment.
+
+    `given` are its tables by name (`experiments.SCHEMAS`), `training_logs` the published logs' summaries, and `main`
+    the main study's correlations.
+    """
     said, found = [], {}
-    if "effects" in given:
+    keys = [{str(name): value for name, value in row.items()} for row in given["cells"].to_dict("records")]
+    shown = views.views(keys, switches="effects" in given)
+    if "effects" in shown:
         said.append(effects_sentence(given["effects"]))
-        found["What each switch does, mean over seeds [95 % interval]; p is Holm-corrected over a column"] = (
-            effects_grid(given["effects"])
-        )
-    if given["cells"]["alpha0"].nunique() > 1:
+        found[
+            "What each switch does, mean over seeds [95 % interval]; p is Holm-corrected over the rows of one kind of "
+            "effect"
+        ] = effects_grid(given["effects"])
+    if "correlation" in shown:
         said.append(correlation_sentence(given["correlation"]))
         found["Pearson's correlation over cells [95 % bootstrap interval], and its range over studies of one seed"] = (
-            correlation_grid(given["correlation"])
+            correlation_grid(given["correlation"], main)
         )
-    if any(name.startswith("released") for name in given["logs"]["protocol"]):
+    if "log" in shown:
         found[
-            "What is logged while training, mean over seeds [least, greatest]: the moving average over 20 iterations; "
-            "the last column is the standard deviation of the torques at the end. Published runs of the same cells "
-            "below"
+            "What the protocol's own log shows while training, its moving average over 20 iterations, mean over seeds "
+            "[least, greatest]; the last column is the standard deviation of the torques at the end. Below, published "
+            "runs of the same cells"
         ] = logs_grid(given["logs"], training_logs)
     if "agreement" in given:
         said.append(agreement_sentence(given["agreement"]))
@@ -117,15 +106,15 @@ def section(
             agreement_grid(given["agreement"])
         )
     shaped = given["comparisons"][given["comparisons"]["family"] == "none"]
-    if "effects" not in given and len(shaped):
+    if "forest" in shown:
         said.append(shaping_sentence(shaped))
-        found["Paired differences to none: mean over seeds [95 % interval]; bold p would be below 0.05"] = shaping_grid(
-            shaped
+        found["Paired differences to none, mean over seeds [95 % interval]; p is Holm-corrected over a column"] = (
+            shaping_grid(shaped)
         )
     found["Every cell, mean over seeds [95 % interval]"] = cells_grid(given["cells"])
     title = TITLES.get(name, protocol_label(name).capitalize())
-    shown = [figure for figure in figures if figure.startswith(f"{name}_")]
-    return Section(name, title, INTROS.get(name, ""), [text for text in said if text], found, shown)
+    figures = [f"{name}_{view}" for view in shown]
+    return Section(name, title, INTROS.get(name, ""), [text for text in said if text], found, figures)
 
 
 def to_markdown(section: Section) -> str:
@@ -133,6 +122,16 @@ def to_markdown(section: Section) -> str:
     parts = [f"## {section.title}", section.intro, *section.sentences]
     parts += [f"{caption}:\n\n{grids.to_markdown(grid)}" for caption, grid in section.grids.items()]
     return "\n\n".join(part for part in parts if part)
+
+
+def within(heading: str) -> str:
+    """A heading as it stands within a sentence."""
+    return heading[0].lower() + heading[1:]
+
+
+def decimals(metric: str) -> tuple[int, float]:
+    """Decimals of a measure, and the factor it is shown with: distances in mm."""
+    return (1, 1000.0) if metric.endswith("distance") else (2, 1.0) if metric.endswith("return") else (3, 1.0)
 
 
 def _interval(row: Mapping[Any, Any], name: str, low: str, high: str, digits: int, factor: float = 1.0) -> str:
@@ -157,8 +156,8 @@ def effects_grid(effects: pd.DataFrame) -> Grid:
         by_metric = {str(row["metric"]): row for row in own.to_dict("records")}
         first = next(iter(by_metric.values()))
         entries = [switch_label(first), variant_label(str(variant)), kinds[str(kind)]]
-        for metric, (digits, factor) in METRICS.items():
-            row = by_metric[metric]
+        for metric in METRICS:
+            row, (digits, factor) = by_metric[metric], decimals(metric)
             entries += [_interval(row, "difference", "ci_low", "ci_high", digits, factor), _p(row["p_holm"])]
         rows.append((list(dict.fromkeys(effects["switch"])).index(switch), entries))
     headings = ["Switch", "Variant", "Effect"]
@@ -169,14 +168,15 @@ def effects_grid(effects: pd.DataFrame) -> Grid:
 def effects_sentence(effects: pd.DataFrame) -> str:
     """Which switch moves each measure most, and where switches interact beyond chance."""
     parts = []
-    for metric, (digits, factor) in METRICS.items():
+    for metric in METRICS:
+        digits, factor = decimals(metric)
         single = effects[(effects["metric"] == metric) & effects["effect"].isin(["alone", "last"])]
         single = single.dropna(subset="difference")
         if single.empty:
             continue
         row = single.iloc[int(single["difference"].abs().to_numpy().argmax())].to_dict()
         parts.append(
-            f"{NAMES[metric][0].lower()}{NAMES[metric][1:]}: {switch_label(row)} "
+            f"{within(NAMES[metric])}: {switch_label(row)} "
             f"({variant_label(row['variant'])}, {KINDS[row['effect']]}), "
             f"{_interval(row, 'difference', 'ci_low', 'ci_high', digits, factor)}"
         )
@@ -185,17 +185,19 @@ def effects_sentence(effects: pd.DataFrame) -> str:
     if not (effects["effect"] == "interaction").any():
         return text
     names = dict.fromkeys(
-        f"{protocol_label(row['switch'])} on {NAMES[row['metric']][0].lower()}{NAMES[row['metric']][1:]} "
-        f"({variant_label(row['variant'])})"
-        for row in found[found["metric"].isin(list(METRICS))].to_dict("records")
+        f"{protocol_label(row['switch'])} on {within(NAMES[row['metric']])} ({variant_label(row['variant'])})"
+        for row in found[found["metric"].isin(METRICS)].to_dict("records")
     )
     if not names:
         return f"{text} No switch's effect depends on the others beyond chance."
     return f"{text} What a switch does depends on the others beyond chance for {', '.join(names)}."
 
 
-def correlation_grid(correlation: pd.DataFrame) -> Grid:
-    """A row per pair of the paper: published, over our cells without and with the labelled baseline, single seeds."""
+def correlation_grid(correlation: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:
+    """A row per pair of the paper: published, over our cells without and with the labelled baseline, single seeds.
+
+    The last column is the main study's, whose start weights are what they say.
+    """
     rows = []
     for (x, y), name in PAIRS.items():
         own = correlation[(correlation["method"] == "pearson") & (correlation["x"] == x) & (correlation["y"] == y)]
@@ -206,9 +208,17 @@ def correlation_grid(correlation: pd.DataFrame) -> Grid:
             _interval(by_level[level], "r", "ci_low", "ci_high", 2) if level in by_level else DASH
             for level in ("published", "cells", "cells_all")
         ]
-        rows.append([name, *texts, span])
-    headings = ["", "Published", "Over our cells", "with the run left out of the tables", "One seed a cell, range"]
-    return Grid(headings, rows)
+        rows.append([name, *texts, span, _main_correlation(main, x, y)])
+    headings = ["", "Published", "Over these cells", "with the run left out of the tables", "One seed a cell, range"]
+    return Grid([*headings, "The text's protocol, true α₀"], rows)
+
+
+def _main_correlation(main: pd.DataFrame | None, x: str, y: str) -> str:
+    if main is None:
+        return DASH
+    ours = of_protocol(main, None)
+    ours = ours[(ours["method"] == "pearson") & (ours["level"] == "cells") & (ours["x"] == x) & (ours["y"] == y)]
+    return _interval(ours.iloc[0].to_dict(), "r", "ci_low", "ci_high", 2) if len(ours) else DASH
 
 
 def correlation_sentence(correlation: pd.DataFrame) -> str:
@@ -222,8 +232,8 @@ def correlation_sentence(correlation: pd.DataFrame) -> str:
     )
 
 
-def logs_grid(logs: pd.DataFrame, training_logs: pd.DataFrame | None) -> Grid:
-    """A row per cell whose own log is the released one, and a row per published log."""
+def logs_grid(logs: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
+    """A row per cell, and a row per published log of one of them."""
 
     def span(values: "pd.Series[float]", digits: int) -> str:
         low, mean, high = (number(value, digits) for value in (values.min(), values.mean(), values.max()))
@@ -238,7 +248,11 @@ def logs_grid(logs: pd.DataFrame, training_logs: pd.DataFrame | None) -> Grid:
         texts.append(span(own["action_std"], 2))
         setting = setting_label(int(cell["budget"]), cell["alpha0"])
         rows.append([protocol_label(cell["protocol"]), variant_label(cell["variant"]), setting, *texts])
-    for run in training_logs.to_dict("records") if training_logs is not None else ():
+    keys = ["protocol", "variant", "budget"]
+    cells = set(logs.loc[logs["alpha0"] == 1, keys].itertuples(index=False, name=None))
+    for run in training_logs.to_dict("records"):
+        if tuple(run[name] for name in keys) not in cells:
+            continue
         texts = [number(run[name], digits) for name, digits in LOGGED.items()]
         setting = budget_label(int(run["budget"]))
         std = f"{number(run['std_1'], 2)} and {number(run['std_2'], 2)}"
@@ -254,7 +268,7 @@ def agreement_grid(agreement: pd.DataFrame) -> Grid:
     """A row per measure: ours, theirs, the difference with its interval, p."""
     rows = []
     for row in agreement.to_dict("records"):
-        digits, factor = (1, 1000.0) if row["metric"].endswith("distance") else (3, 1.0)
+        digits, factor = decimals(row["metric"])
         means = [number(factor * row[name], digits) for name in ("ours", "theirs")]
         difference = _interval(row, "difference", "ci_low", "ci_high", digits, factor)
         rows.append([NAMES[row["metric"]], *means, difference, _p(row["p"]), _p(row["p_holm"])])
@@ -267,7 +281,7 @@ def agreement_sentence(agreement: pd.DataFrame) -> str:
     seeds = f"{agreement['our_seeds'].max():.0f} seeds beside {agreement['their_seeds'].max():.0f}"
     if apart.empty:
         return f"None of {len(agreement)} measures differs from Stable-Baselines3's beyond chance ({seeds})."
-    names = ", ".join(NAMES[name].lower() for name in apart["metric"])
+    names = ", ".join(within(NAMES[name]) for name in apart["metric"])
     return (
         f"{len(apart)} of {len(agreement)} measures differ from Stable-Baselines3's beyond chance ({seeds}): {names}."
     )
@@ -287,7 +301,7 @@ def shaping_grid(shaped: pd.DataFrame) -> Grid:
     for (protocol, variant, budget, alpha0), own in by_cell.items():
         entries = [protocol_label(protocol), variant_label(variant), setting_label(int(budget), alpha0)]
         for metric in SHAPING:
-            digits, factor = (1, 1000.0) if metric.endswith("distance") else (3, 1.0)
+            digits, factor = decimals(metric)
             entries.append(_interval(own[metric], "difference", "ci_low", "ci_high", digits, factor))
             entries.append(_p(own[metric]["p_holm"]))
         rows.append(entries)
@@ -297,13 +311,17 @@ def shaping_grid(shaped: pd.DataFrame) -> Grid:
 
 def shaping_sentence(shaped: pd.DataFrame) -> str:
     """In how many comparisons a shaped cell differs from `none` beyond chance, measure by measure."""
+    family = shaped.groupby(["protocol", "metric"]).size().max()
+    seeds = int(shaped["seeds"].max())
+    if 2.0 ** (1 - seeds) * family > LEVEL:  # the smallest p of a sign-flip test, corrected
+        return f"With {seeds} seeds no difference between {family} shaped cells and none can be told from chance."
     parts = []
     for metric in SHAPING:
         own = shaped[shaped["metric"] == metric].dropna(subset="p_holm")
         apart = own[own["p_holm"] < LEVEL]
         better = (apart["difference"] < 0).sum() if metric.endswith("distance") else (apart["difference"] > 0).sum()
         parts.append(
-            f"{NAMES[metric][0].lower()}{NAMES[metric][1:]} in {len(apart)} of {len(own)}"
+            f"{within(NAMES[metric])} in {len(apart)} of {len(own)}"
             + (f" ({better} for the better)" if len(apart) else "")
         )
     return f"Shaped cells that differ from none beyond chance (Holm, 5 %): {', '.join(parts)}."

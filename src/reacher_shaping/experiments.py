@@ -1,6 +1,7 @@
 """Tables of the further studies: what a switch between two protocols does, what is logged, ours beside a peer.
 
-All differences are over seeds; a switch is compared on common seeds, which share first weights, resets and noise.
+All differences are over seeds; a switch is compared on common seeds, which share first weights, resets and noise unless
+the switch itself changes how many are drawn.
 Effects of a switch, each named in the column `effect`:
 
 | effect | difference |
@@ -13,16 +14,31 @@ Effects of a switch, each named in the column `effect`:
 Holm's correction is over all effects of one kind and metric, so that each table answers one question per metric.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from reacher_shaping import learning, stats
+from reacher_shaping import artifacts, learning, stats
 from reacher_shaping.aggregate import CORRELATED, KEY, correlations, generator, in_table_2
 from reacher_shaping.cell import Protocol
 from reacher_shaping.config import Switches
+
+SCHEMAS = {
+    "runs": artifacts.RUNS,
+    "cells": artifacts.CELLS,
+    "curves": artifacts.CURVES,
+    "logs": artifacts.LOGS,
+    "logged": artifacts.CURVES,
+    "comparisons": artifacts.COMPARISONS,
+    "correlation": artifacts.CORRELATION,
+    "controllers": artifacts.CONTROLLERS,
+    "effects": artifacts.EFFECTS,
+    "agreement": artifacts.AGREEMENT,
+}
+"""The tables of a further study by the names of their files, see `views.table_files`."""
 
 EFFECT_METRICS = ("success_rate", "final_success_rate", "unit_return", "final_distance")
 AGREEMENT_METRICS = (
@@ -35,6 +51,14 @@ AGREEMENT_METRICS = (
     "deterministic_mean_return",
     "deterministic_final_distance",
 )
+
+
+def read(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
+    """The tables of further studies by study and name, from their files. Raises ArtifactError."""
+    found: dict[str, dict[str, pd.DataFrame]] = {}
+    for path in map(Path, paths):
+        found.setdefault(path.parent.name, {})[path.stem] = artifacts.read_table(path, SCHEMAS[path.stem])
+    return found
 
 
 def unit_return(runs: pd.DataFrame, protocols: Mapping[str, Protocol]) -> "pd.Series[float]":
@@ -55,10 +79,11 @@ def effects_frame(
     p_holm, seeds. Cells that are not among `runs` give no row.
     """
     runs = runs.assign(unit_return=unit_return(runs, protocols))
-    by_cell = {key: own.set_index("seed") for key, own in runs.groupby(["protocol", "variant", "budget"])}
+    by_cell = {key: own.set_index("seed") for key, own in runs.groupby(KEY)}
     rows = []
     for variant, switch, effect, terms in _contrasts(switches):
-        keys = {(protocol, variant, switches.budget): sign for protocol, sign in terms.items()}
+        rest = (variant, switches.budget, 1.0 if variant == "none" else switches.alpha0)
+        keys = {(protocol, *rest): sign for protocol, sign in terms.items()}
         if not keys.keys() <= by_cell.keys():
             continue
         for metric in EFFECT_METRICS:
@@ -138,7 +163,7 @@ def _means(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def agreement_frame(runs: pd.DataFrame, peers: pd.DataFrame) -> pd.DataFrame:
-    """Our unshaped cells beside the peers of the same budget: is there a difference beyond chance?
+    """Our unshaped cells of one protocol beside the peers of the same budget: is there a difference beyond chance?
 
     Columns: algorithm, budget, metric, ours, theirs, difference (ours less theirs), Welch's ci_low, ci_high and p,
     p_holm over the metrics of a peer, our_seeds, their_seeds.

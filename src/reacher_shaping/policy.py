@@ -64,7 +64,7 @@ def parameter_count(hidden: int, towers: int = 1) -> int:
 
 
 def layers(rows: Tensor, hidden: int, towers: int = 1) -> Layers:
-    """Return the layers as views of `rows` [S, P]."""
+    """Return the layers as views of `rows` [S, P] of networks of K = `towers`."""
     stack = rows.view(len(rows) * towers, -1)
     views, start = [], 0
     for shape in _shapes(hidden):
@@ -104,12 +104,14 @@ def initialise(seeds: Sequence[int], root_seed: int, settings: PPO) -> Tensor:
 
 
 def _draw_default(tower: Layers, generator: np.random.Generator) -> None:
+    """Draw the weights of one tower, its layers without their first axis, in place."""
     for view, inputs in zip(tower[:5], [OBSERVATION_SIZE, *[len(tower.second)] * 4], strict=True):
         bound = 1 / math.sqrt(inputs)
         view.copy_(torch.from_numpy(generator.uniform(-bound, bound, size=tuple(view.shape)).astype(np.float32)))
 
 
 def _draw_orthogonal(tower: Layers, generator: np.random.Generator) -> None:
+    """Draw the weights of one tower, its layers without their first axis, in place; its biases stay as they are."""
     random = torch.Generator().manual_seed(int(generator.integers(2**63)))
     gains = [math.sqrt(2), math.sqrt(2), 0.01, 1.0]
     weights = [tower.first[:-1].T, tower.second.T, tower.head[:ACTION_SIZE], tower.head[ACTION_SIZE:]]

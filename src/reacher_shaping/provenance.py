@@ -24,7 +24,10 @@ from typing import Any
 from reacher_shaping import artifacts
 
 PACKAGE = __package__ or "reacher_shaping"
-VERSIONED = ("torch", "mujoco", "gymnasium", "numpy", "pandas", "pyarrow", "scipy", "matplotlib", "snakemake")
+VERSIONED = (
+    "torch", "mujoco", "gymnasium", "numpy", "pandas", "pyarrow", "scipy", "matplotlib", "snakemake",
+    "stable-baselines3", "optuna",
+)  # fmt: skip
 
 NEUTRAL = ("meter", "provenance")  # modules that tell of a result and never change one
 WHOLE = "*"  # in place of a definition's name: all definitions of its module

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping import answers, artifacts, stats, tables
+from reacher_shaping import answers, artifacts, experiments, stats, tables
 from reacher_shaping.aggregate import KEY
 
 TABLES = {
@@ -35,20 +35,6 @@ TABLES = {
 OPTIONAL = {"peers.parquet": artifacts.PEERS, "search/trials.csv": artifacts.TRIALS}
 """Tables that are kept with it where the run has them."""
 
-EXPERIMENT_TABLES = {
-    "runs.parquet": artifacts.RUNS,
-    "cells.parquet": artifacts.CELLS,
-    "curves.parquet": artifacts.CURVES,
-    "logs.parquet": artifacts.LOGS,
-    "logged.parquet": artifacts.CURVES,
-    "comparisons.parquet": artifacts.COMPARISONS,
-    "correlation.csv": artifacts.CORRELATION,
-    "controllers.parquet": artifacts.CONTROLLERS,
-    "effects.csv": artifacts.EFFECTS,
-    "agreement.csv": artifacts.AGREEMENT,
-}
-"""Tables of a further study; the last two are there where it has switches and peers."""
-
 COMPARED = ("success_rate", "mean_return")
 LEVEL = 0.05
 _BLOCK = re.compile(r"(<!-- reference: begin -->\n).*(<!-- reference: end -->)", re.DOTALL)
@@ -66,15 +52,20 @@ def keep_tables(results: Path, kept: Path) -> None:
         _keep(results / name, kept / name, table)
 
 
-def keep_experiments(results: Path, kept: Path, names: Sequence[str]) -> list[str]:
-    """Write the tables of those further studies of `names` that were made; return their names. Raises ArtifactError."""
+def keep_experiments(results: Path, kept: Path, files: Mapping[str, Sequence[str]]) -> list[str]:
+    """Write the tables of those further studies that are complete; return their names. Raises ArtifactError.
+
+    `files` are the names of each study's tables.
+    """
+    folders = {name: results / "experiments" / name for name in files}
+    made = [name for name, folder in folders.items() if all((folder / file).exists() for file in files[name])]
+    found = experiments.read(str(folders[name] / file) for name in made for file in files[name])
     shutil.rmtree(kept / "experiments", ignore_errors=True)
-    made = [name for name in names if (results / "experiments" / name / "runs.parquet").exists()]
-    for experiment in made:
-        for name, table in EXPERIMENT_TABLES.items():
-            place = Path("experiments") / experiment / name
-            if name not in ("effects.csv", "agreement.csv") or (results / place).exists():
-                _keep(results / place, kept / place, table)
+    for name in made:
+        for file in files[name]:
+            stem = Path(file).stem
+            target = kept / "experiments" / name / file
+            artifacts.write_table(target, found[name][stem], experiments.SCHEMAS[stem], sealed=False)
     return made
 
 
@@ -122,7 +113,7 @@ def manifest(
     settings: Mapping[str, Any],
     settings_hash: str,
     blocks: Sequence[Mapping[str, Any]],
-    experiments: Mapping[str, Sequence[Mapping[str, Any]]],
+    further: Mapping[str, Sequence[Mapping[str, Any]]],
     peers: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Return what the reference run was: settings, and the record of each block, further study's block and peer.
@@ -135,9 +126,13 @@ def manifest(
     def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         return [{name: block[name] for name in kept if name in block} for block in given]
 
-    further = {name: records(given) for name, given in experiments.items()}
-    told = {"blocks": records(blocks), "experiments": further, "peers": records(peers)}
-    return {"study": settings, "settings_hash": settings_hash, **told}
+    return {
+        "study": settings,
+        "settings_hash": settings_hash,
+        "blocks": records(blocks),
+        "experiments": {name: records(given) for name, given in further.items()},
+        "peers": records(peers),
+    }
 
 
 def headline(

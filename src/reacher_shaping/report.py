@@ -47,7 +47,7 @@ class Inputs:
     spread: pd.DataFrame | None = None
     peers: pd.DataFrame | None = None
     experiments: Mapping[str, Mapping[str, pd.DataFrame]] = field(default_factory=dict)
-    training_logs: pd.DataFrame | None = None
+    training_logs: pd.DataFrame = field(default_factory=pd.DataFrame)
     figures: Mapping[str, Path] = field(default_factory=dict)
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
@@ -98,7 +98,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
             picture for name, picture in pictures.items() if not name.startswith(own) and name not in OWN_SECTION
         ],
         "experiments": [
-            experiment_report.section(name, given, inputs.figures, inputs.training_logs)
+            experiment_report.section(name, given, inputs.training_logs, inputs.correlation)
             for name, given in inputs.experiments.items()
         ],
         "departures": departures_grid(inputs.study),

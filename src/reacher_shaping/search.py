@@ -10,9 +10,8 @@ from typing import Any
 
 import optuna
 import pandas as pd
-from pydantic import ValidationError
 
-from reacher_shaping.cell import Cell, ConfigError, Protocol, Variant, first_problem
+from reacher_shaping.cell import Cell
 from reacher_shaping.config import Search
 from reacher_shaping.evaluate import evaluate
 from reacher_shaping.train import train
@@ -40,28 +39,6 @@ def _distribution(space: Mapping[str, Any]) -> optuna.distributions.BaseDistribu
     kind = optuna.distributions.IntDistribution
     whole = isinstance(space["low"], int) and isinstance(space["high"], int)
     return (kind if whole else optuna.distributions.FloatDistribution)(space["low"], space["high"], log=space["log"])
-
-
-def cell_of(search: Search, protocol: Protocol, variant: Variant, values: Mapping[str, Any]) -> Cell:
-    """Return the cell that a trial trains: `protocol` and alpha0 = 1 but for `values`.
-
-    Raises ConfigError where they make no cell.
-    """
-    settings = protocol.model_dump()
-    for path, value in {**search.fixed, **values}.items():
-        part, _, key = path.partition(".")
-        if key:
-            settings[part][key] = value
-    try:
-        return Cell(
-            protocol=Protocol.model_validate(settings),
-            variant=variant,
-            budget=search.budget,
-            alpha0=values.get("alpha0", 1.0),
-            root_seed=search.root_seed,
-        )
-    except ValidationError as error:
-        raise ConfigError(f"search: a trial with {dict(values)}: {first_problem(error)}") from None
 
 
 def score(cell: Cell, seeds: int, *, episodes: int, radius: float) -> dict[str, float]:

@@ -163,7 +163,8 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
     Args:
         shaped: [S, E] shaped returns of the rollout's whole episodes.
         unlogged: [S] shaped return of the rollout before, after its last whole episode. The running sum of an
-            episode is not cleared where a rollout starts, so the first episode's contains it.
+            episode is not cleared where a rollout starts, so the first episode's contains it. With the paper's 40
+            episodes a rollout the first is not among the last ten, so it never shows there.
     """
     logged = shaped.copy()
     logged[:, 0] += unlogged

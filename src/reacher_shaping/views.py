@@ -1,13 +1,28 @@
-"""Which figures a further study has: what its cells can show. Imports nothing heavy, since the workflow asks it too."""
+"""What a further study has, by name: its tables' files and its figures. Nothing heavy is loaded, for the workflow."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-NAMES = ("cells", "effects", "log", "correlation", "forest")
+VIEWS = ("cells", "effects", "log", "correlation", "forest")
+COMMON_TABLES = (
+    "runs.parquet",
+    "cells.parquet",
+    "curves.parquet",
+    "logs.parquet",
+    "logged.parquet",
+    "comparisons.parquet",
+    "correlation.csv",
+    "controllers.parquet",
+)
+
+
+def table_files(*, switches: bool, peers: bool) -> list[str]:
+    """Return the files of a study's tables: those of all, and of one that has `switches` or `peers`."""
+    return [*COMMON_TABLES, *(["effects.csv"] if switches else []), *(["agreement.csv"] if peers else [])]
 
 
 def views(keys: Iterable[Mapping[str, Any]], *, switches: bool) -> list[str]:
-    """Return the names of a study's figures.
+    """Return the names of a study's figures, what its cells can show.
 
     Args:
         keys: `protocol, variant, budget, alpha0` of its cells.
@@ -19,8 +34,8 @@ def views(keys: Iterable[Mapping[str, Any]], *, switches: bool) -> list[str]:
     shown = {
         "cells": True,
         "effects": switches,
-        "log": not switches and any(name.startswith("released") for name in variants),
+        "log": not switches,
         "correlation": len(labels) > 1,  # a baseline of several weights: alpha0 is a label there
         "forest": not switches and any("none" in own and len(own) > 2 for own in variants.values()),
     }
-    return [name for name in NAMES if shown[name]]
+    return [name for name in VIEWS if shown[name]]

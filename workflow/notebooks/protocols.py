@@ -26,24 +26,24 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import SVG, Markdown, display
 
-from reacher_shaping import artifacts, experiment_figures, experiment_report, style, views
+from reacher_shaping import artifacts, experiment_figures, experiment_report, experiments, style, views
 
 folder = Path(results)
 
 # %%
 paths = [path for path in sorted(folder.glob("experiments/*/*")) if path.suffix in (".parquet", ".csv")]
-experiments = experiment_report.read(map(str, paths))
+given = experiments.read(str(path) for path in paths if path.stem in experiments.SCHEMAS)
 training_logs = pd.read_csv(Path(published) / "training_logs.csv")
 main = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
 
 # %%
-if not experiments:
+if not given:
     display(Markdown("No further study has been run; `snakemake released attribution standard tuned` does it."))
 
 # %%
-for name, tables in experiments.items():
-    display(Markdown(experiment_report.to_markdown(experiment_report.section(name, tables, [], training_logs))))
+for name, tables in given.items():
+    display(Markdown(experiment_report.to_markdown(experiment_report.section(name, tables, training_logs, main))))
     keys = tables["cells"].to_dict("records")
     for view in views.views(keys, switches="effects" in tables):
-        figure = experiment_figures.draw(view, tables, training_logs, main)
+        figure = experiment_figures.draw(view, tables, training_logs)
         display(SVG(style.to_bytes(figure, "svg")))

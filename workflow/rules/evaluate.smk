@@ -53,7 +53,7 @@ rule evaluate_controllers:
     threads: 1
     params:
         evaluation=as_json(STUDY.evaluation.model_dump()),
-        protocols=as_json([protocol.model_dump() for protocol in STUDY.protocols.values()]),
+        protocols=protocols_of(STUDY.cells),
         root_seed=STUDY.root_seed,
         code=code("evaluate_controllers"),
     script:

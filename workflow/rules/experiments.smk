@@ -1,7 +1,6 @@
 # The further studies of config.yaml, each an optional target of its name: `snakemake attribution`. Once made, they are
 # part of the report.
-from reacher_shaping.views import NAMES as VIEWS
-from reacher_shaping.views import views
+from reacher_shaping.views import VIEWS, table_files, views
 
 
 def of_experiment(make):
@@ -11,11 +10,6 @@ def of_experiment(make):
 
 def of_blocks(file):
     return of_experiment(lambda cells, seeds: [f"{block}/{file}" for block in blocks(cells, seeds)])
-
-
-def protocols_of(cells, seeds=None):
-    """The settings of the cells' protocols, each once."""
-    return as_json(list({cell.protocol.name: cell.protocol.model_dump() for cell in cells}.values()))
 
 
 def peers_of(experiment):
@@ -36,21 +30,25 @@ def figures_of(experiment):
 
 
 def tables_of(experiment):
-    """Names and files of an experiment's tables."""
-    names = ["runs.parquet", "cells.parquet", "curves.parquet", "logs.parquet", "logged.parquet"]
-    names += ["comparisons.parquet", "correlation.csv", "controllers.parquet"]
-    names += ["effects.csv"] if STUDY.experiments[experiment].switches else []
-    names += ["agreement.csv"] if STUDY.experiments[experiment].peers else []
-    return {name.partition(".")[0]: f"results/experiments/{experiment}/{name}" for name in names}
+    """Files of an experiment's tables."""
+    settings = STUDY.experiments[experiment]
+    files = table_files(switches=settings.switches is not None, peers=settings.peers is not None)
+    return [f"results/experiments/{experiment}/{file}" for file in files]
+
+
+def runs_of(experiment):
+    """What an experiment's tables are made of. A target names it too, as the main study's does."""
+    return [
+        f"{block}/{file}"
+        for block in blocks(EXPERIMENTS[experiment], STUDY.experiments[experiment].seeds)
+        for file in ["policy.pt", "progress.parquet", "episodes.parquet", "manifest.json"]
+    ]
 
 
 # An experiment whose tables are there is part of the report.
-MADE = [name for name in EXPERIMENTS if all(Path(path).exists() for path in tables_of(name).values())]
-MADE_TABLES = [path for name in MADE for path in tables_of(name).values()]
+MADE = [name for name in EXPERIMENTS if all(Path(path).exists() for path in tables_of(name))]
+MADE_TABLES = [path for name in MADE for path in tables_of(name)]
 MADE_FIGURES = [path for name in MADE for path in figures_of(name)]
-
-# The main study's correlations stand beside an experiment's once they are there.
-MAIN_CORRELATION = [path for path in ["results/correlation.csv"] if Path(path).exists()]
 
 
 wildcard_constraints:
@@ -104,6 +102,23 @@ use rule train_peer as train_experiment_peer with:
         evaluation=as_json(STUDY.evaluation.model_dump()),
         root_seed=STUDY.root_seed,
         code=code("train_peer"),
+
+
+use rule check_results as check_experiment with:
+    input:
+        runs="results/experiments/{experiment}/runs.parquet",
+        cells="results/experiments/{experiment}/cells.parquet",
+    output:
+        "results/experiments/{experiment}/check.txt",
+    log:
+        "results/logs/experiments/{experiment}/check.log",
+    benchmark:
+        "results/benchmarks/experiments/{experiment}/check.tsv"
+    params:
+        cells=of_experiment(lambda cells, seeds: [cell.key for cell in cells]),
+        seeds=of_experiment(lambda cells, seeds: seeds),
+        episodes=STUDY.evaluation.episodes,
+        code=code("check_results"),
 
 
 rule summarise_experiment:
@@ -160,6 +175,7 @@ rule compare_with_peers:
         "results/benchmarks/experiments/{experiment}/agreement.tsv"
     threads: 1
     params:
+        protocol=of_experiment(lambda cells, seeds: cells[0].protocol.name),
         code=code("compare_with_peers"),
     script:
         "../scripts/compare_with_peers.py"
@@ -167,9 +183,8 @@ rule compare_with_peers:
 
 rule plot_experiment:
     input:
-        lambda wildcards: tables_of(wildcards.experiment).values(),
+        lambda wildcards: tables_of(wildcards.experiment),
         training_logs=source("report/published/training_logs.csv"),
-        main=MAIN_CORRELATION,
     output:
         expand("figures/{{experiment}}_{{view}}.{kind}", kind=KINDS),
     log:
@@ -189,5 +204,7 @@ for name in EXPERIMENTS:
         name:
             name
         input:
-            tables_of(name).values(),
+            runs_of(name),
+            tables_of(name),
+            f"results/experiments/{name}/check.txt",
             figures_of(name),

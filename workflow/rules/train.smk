@@ -20,6 +20,11 @@ def block_cells(cells, seeds):
     return [cell.key for cell in cells for _ in STUDY.blocks(seeds)]
 
 
+def protocols_of(cells, seeds=None):
+    """The settings of the cells' protocols, each once."""
+    return as_json(list({cell.protocol.name: cell.protocol.model_dump() for cell in cells}.values()))
+
+
 BLOCKS = blocks(STUDY.cells, STUDY.seeds)
 BLOCK_FILES = expand(
     "{block}/{file}",

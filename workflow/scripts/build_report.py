@@ -7,7 +7,7 @@ import pandas as pd
 import yaml
 from job import logged
 
-from reacher_shaping import artifacts, experiment_report, report, tables
+from reacher_shaping import artifacts, experiments, report, tables
 
 given, params = snakemake.input, snakemake.params
 
@@ -34,7 +34,7 @@ with logged(snakemake.log[0]):
         winners=artifacts.read_table(given.winners, artifacts.WINNERS),
         spread=artifacts.read_table(given.spread, artifacts.SPREAD),
         peers=artifacts.read_table(given.peers[0], artifacts.PEERS) if given.peers else None,
-        experiments=experiment_report.read(given.experiments),
+        experiments=experiments.read(given.experiments),
         training_logs=pd.read_csv(given.training_logs),
         published=tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3)),
         ledger=yaml.safe_load(Path(given.ledger).read_text(encoding="utf-8")),

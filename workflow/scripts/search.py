@@ -23,17 +23,17 @@ kept = Path("results/.checkpoints") / f"search-{hashlib.sha256(json.dumps(settin
 
 def measure(values: search.Values) -> search.Values:
     """Train and evaluate one trial."""
-    cell = search.cell_of(spec, protocol, variant, values)
+    cell = spec.cell(protocol, variant, values)
     return search.score(cell, spec.seeds, episodes=evaluation.episodes, radius=evaluation.radius)
 
 
 with logged(snakemake.log[0]) as say:
     torch.set_num_threads(1)
-    done = artifacts.read_table(kept, artifacts.TRIALS) if kept.exists() else None
+    done = artifacts.read_table(kept, artifacts.TRIALS).head(spec.trials) if kept.exists() else None
     meter = Meter(spec.trials, spec.seeds * spec.budget, 0 if done is None else len(done), unit="trial")
     for trials in search.trials(spec, measure, done):
         artifacts.write_table(kept, trials, artifacts.TRIALS, sealed=False)
         for line in meter.lines(len(trials)):
             say(f"{line}, best return {trials['mean_return'].max():.3f}")
-    artifacts.write_table(snakemake.output[0], artifacts.read_table(kept, artifacts.TRIALS), artifacts.TRIALS)
-    kept.unlink(missing_ok=True)
+    found = artifacts.read_table(kept, artifacts.TRIALS).head(spec.trials)  # kept: more trials later go on from these
+    artifacts.write_table(snakemake.output[0], found, artifacts.TRIALS)
