@@ -146,6 +146,18 @@ def test_section_counts_the_differences_that_survive_holm(released):
     assert "success, any step in 0 of 4," in text
 
 
+def test_document_holds_every_table_and_figure(released):
+    controllers = synthetic.controllers().assign(protocol="released", mode="stochastic", final_success_rate=1.0)
+    curve = {"protocol": "released", "variant": "none", "alpha0": 1.0, "budget": 500_000, "episode_return": -50.0}
+    logged = pd.DataFrame({"iteration": [1, 2], **curve})
+    given = {"released": {**released, "controllers": controllers, "logged": logged}}
+    text = experiment_report.document(given, LOGS)
+    assert text.startswith("## The study as the released code computes it")
+    assert text.count("<img ") == 4
+    assert text.count("| --: |") >= 4
+    assert experiment_report.document({}, LOGS) == ""
+
+
 def test_unknown_experiment_has_a_section_too(released):
     section = experiment_report.section("my_study", released, LOGS)
     assert (section.title, section.intro) == ("My study", "")

@@ -3,16 +3,17 @@
 Every number comes from the experiment's tables; here they are only chosen, rounded and put into words.
 """
 
+import base64
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
-from reacher_shaping import grids, tables, views
+from reacher_shaping import experiment_figures, grids, tables, views
 from reacher_shaping.experiment_figures import KINDS, protocol_label, switch_label
 from reacher_shaping.grids import Grid, of_table
-from reacher_shaping.style import budget_label, cell_order, number, of_protocol, setting_label, variant_label
+from reacher_shaping.style import budget_label, cell_order, number, of_protocol, setting_label, to_bytes, variant_label
 
 LEVEL = 0.05
 TITLES = {
@@ -117,10 +118,19 @@ def section(
     return Section(name, title, INTROS.get(name, ""), [text for text in said if text], found, figures)
 
 
-def to_markdown(section: Section) -> str:
-    """The section's words and tables for a notebook."""
-    parts = [f"## {section.title}", section.intro, *section.sentences]
-    parts += [f"{caption}:\n\n{grids.to_markdown(grid)}" for caption, grid in section.grids.items()]
+def document(
+    given: Mapping[str, Mapping[str, pd.DataFrame]], training_logs: pd.DataFrame, main: pd.DataFrame | None = None
+) -> str:
+    """All experiments for a notebook, in Markdown with their figures in it; empty where there are none."""
+    parts: list[str] = []
+    for name, own_tables in given.items():
+        own = section(name, own_tables, training_logs, main)
+        parts += [f"## {own.title}", own.intro, *own.sentences]
+        for figure in own.figures:
+            drawn = experiment_figures.draw(figure.removeprefix(f"{name}_"), own_tables, training_logs)
+            picture = base64.b64encode(to_bytes(drawn, "svg")).decode()
+            parts.append(f'<img alt="{figure}" src="data:image/svg+xml;base64,{picture}">')
+        parts += [f"{caption}:\n\n{grids.to_markdown(grid)}" for caption, grid in own.grids.items()]
     return "\n\n".join(part for part in parts if part)
 
 

@@ -24,9 +24,9 @@ protocol = "paper"
 from pathlib import Path
 
 import pandas as pd
-from IPython.display import SVG, Markdown, display
+from IPython.display import Markdown
 
-from reacher_shaping import artifacts, experiment_figures, experiment_report, experiments, style, views
+from reacher_shaping import artifacts, experiment_report, experiments
 
 folder = Path(results)
 
@@ -37,13 +37,5 @@ training_logs = pd.read_csv(Path(published) / "training_logs.csv")
 main = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
 
 # %%
-if not given:
-    display(Markdown("No further study has been run; `snakemake released attribution standard tuned` does it."))
-
-# %%
-for name, tables in given.items():
-    display(Markdown(experiment_report.to_markdown(experiment_report.section(name, tables, training_logs, main))))
-    keys = tables["cells"].to_dict("records")
-    for view in views.views(keys, switches="effects" in tables):
-        figure = experiment_figures.draw(view, tables, training_logs)
-        display(SVG(style.to_bytes(figure, "svg")))
+nothing = "No further study has been run; `snakemake released attribution standard tuned` does it."
+Markdown(experiment_report.document(given, training_logs, main) or nothing)
