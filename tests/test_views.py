@@ -35,5 +35,6 @@ def test_the_studies_of_the_configuration_have_theirs():
         "released": ["cells", "log", "correlation", "forest"],
         "attribution": ["cells", "effects"],
         "standard": ["cells", "log", "forest"],
-        "tuned": ["cells", "effects"],
+        "tuned": ["cells", "log"],
+        "ablation": ["cells", "effects"],
     }

@@ -37,5 +37,5 @@ training_logs = pd.read_csv(Path(published) / "training_logs.csv")
 main = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
 
 # %%
-nothing = "No further study has been run; `snakemake released attribution standard tuned` does it."
+nothing = "No further study has been run; `snakemake released attribution standard tuned ablation` does it."
 Markdown(experiment_report.document(given, training_logs, main) or nothing)
