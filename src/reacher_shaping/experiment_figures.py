@@ -196,7 +196,7 @@ def log(logged: pd.DataFrame, training_logs: pd.DataFrame) -> Figure:
     (`report/published/training_logs.csv`). The scale leaves out what falls below four times the published lowest.
     """
     keys = ["protocol", "budget", "alpha0"]
-    settings = list(dict.fromkeys(logged[keys].itertuples(index=False, name=None)))
+    settings = sorted(set(logged[keys].itertuples(index=False, name=None)), key=lambda key: (key[0], -key[2], key[1]))
     columns = max(len(settings), 1)
     figure = Figure(figsize=(3.7 * columns + 1.2, 3.8))
     panels = figure.subplots(1, columns, squeeze=False)[0]
@@ -220,7 +220,8 @@ def log(logged: pd.DataFrame, training_logs: pd.DataFrame) -> Figure:
             axes.plot([run["peak_iteration"], last], ends, linestyle="none", label="_published", zorder=4, **marker)
         axes.set_xlabel("PPO iteration")
     panels[0].set_ylabel("Logged return")
-    handles, labels = panels[0].get_legend_handles_labels()
+    by_label = {label: line for axes in panels for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    labels, handles = list(by_label), list(by_label.values())
     if any(line.get_label() == "_published" for axes in panels for line in axes.lines):
         handles.append(Line2D([], [], linestyle="none", **PUBLISHED))
         labels.append("published: peak, end")
