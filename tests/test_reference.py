@@ -38,7 +38,12 @@ def make_runs(shift=0.0, seeds=6, first=0):
 def test_readme_says_what_the_reference_tables_hold():
     record = json.loads((KEPT / "manifest.json").read_text())
     text = reference.headline(
-        read("cells.parquet"), read("claims.csv"), published(), record, "report/reference/headline.svg"
+        read("cells.parquet"),
+        read("claims.csv"),
+        published(),
+        record,
+        "report/reference/headline.svg",
+        reference.sections(KEPT, pd.read_csv(ROOT / "report/published/training_logs.csv")),
     )
     assert reference.put_headline((ROOT / "README.md").read_text(), text) == (ROOT / "README.md").read_text()
 

@@ -51,7 +51,8 @@ def main() -> None:
     cells = artifacts.read_table(KEPT / "cells.parquet", artifacts.CELLS)
     claims = artifacts.read_table(KEPT / "claims.csv", artifacts.CLAIMS)
     published = tables.published_cells(*(pd.read_csv(f"report/published/table{number}.csv") for number in (2, 3)))
-    text = reference.headline(cells, claims, published, record, f"{KEPT}/{FIGURE}")
+    logs = pd.read_csv("report/published/training_logs.csv")
+    text = reference.headline(cells, claims, published, record, f"{KEPT}/{FIGURE}", reference.sections(KEPT, logs))
     artifacts.write_text(README, reference.put_headline(README.read_text(encoding="utf-8"), text))
     print(f"The reference run: {KEPT} and README.md")
 

@@ -87,6 +87,8 @@ def section(
     said, found = [], {}
     keys = [{str(name): value for name, value in row.items()} for row in given["cells"].to_dict("records")]
     shown = views.views(keys, switches="effects" in given)
+    if "effects" not in shown:
+        said.append(best_sentence(given["cells"]))
     if "effects" in shown:
         said.append(effects_sentence(given["effects"]))
         found[
@@ -159,6 +161,18 @@ def _interval(row: Mapping[Any, Any], name: str, low: str, high: str, digits: in
 
 def _p(value: float) -> str:
     return DASH if pd.isna(value) else "< 0.001" if value < 0.001 else number(value, 3)
+
+
+def best_sentence(cells: pd.DataFrame) -> str:
+    """The cell with the highest success rate, and what it reaches at the last step."""
+    row = cells.sort_values("success_rate", ascending=False).iloc[0].to_dict()
+    name = f"{protocol_label(row['protocol'])}, {variant_label(row['variant'])}"
+    texts = [
+        f"{within(NAMES[metric])} {_interval(row, metric, f'{metric}_low', f'{metric}_high', *decimals(metric))}"
+        for metric in ("success_rate", "final_success_rate", "mean_return")
+    ]
+    setting = setting_label(int(row["budget"]), row["alpha0"])
+    return f"Of these cells {name} ({setting}) has the highest success rate: {'; '.join(texts)}."
 
 
 def effects_grid(effects: pd.DataFrame) -> Grid:

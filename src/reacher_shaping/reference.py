@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping import answers, artifacts, experiments, stats, tables
+from reacher_shaping import answers, artifacts, experiment_report, experiments, stats, tables
 from reacher_shaping.aggregate import KEY
 
 TABLES = {
@@ -135,18 +135,32 @@ def manifest(
     }
 
 
+def sections(kept: Path, training_logs: pd.DataFrame) -> list[experiment_report.Section]:
+    """Return what the report says of the further studies kept in a folder. Raises ArtifactError."""
+    given = experiments.read(str(path) for path in sorted(kept.glob("experiments/*/*.*")))
+    return [experiment_report.section(name, tables, training_logs) for name, tables in given.items()]
+
+
 def headline(
-    cells: pd.DataFrame, claims: pd.DataFrame, published: pd.DataFrame, record: Mapping[str, Any], figure: str
+    cells: pd.DataFrame,
+    claims: pd.DataFrame,
+    published: pd.DataFrame,
+    record: Mapping[str, Any],
+    figure: str,
+    further: Sequence[experiment_report.Section] = (),
 ) -> str:
     """Return the README's account of the reference run as Markdown.
 
-    `record` comes from `manifest`; `figure` is the path of the headline figure.
+    `record` comes from `manifest`; `figure` is the path of the headline figure; `further` comes from `sections`.
     """
     summary = answers.summary(cells, claims)
     questions = [f"- {answer.question} **{answer.short}**" for answer in summary.answers]
     table = tables.to_markdown(tables.table_1(cells, published), "The six best cells of the main grid:")
     picture = f"![Success rate of every cell, with intervals and the published values]({figure})"
-    parts = [" ".join(summary.headline), "\n".join(questions), picture, table.strip(), _facts(record)]
+    studies = [f"- **{own.title}** {' '.join(own.sentences)}" for own in further]
+    parts = [" ".join(summary.headline), "\n".join(questions), picture, table.strip()]
+    parts += ["The further studies:", "\n".join(studies)] if studies else []
+    parts.append(_facts(record))
     return "\n\n".join(parts) + "\n"
 
 
@@ -155,12 +169,30 @@ def _facts(record: Mapping[str, Any]) -> str:
     blocks = record["blocks"]
     seeds = sorted({seed for block in blocks for seed in block["seeds"]})
     commits = ", ".join(sorted({str(block["git"]["commit"])[:12] for block in blocks}))
-    steps = sum(block["env_steps"] for block in blocks)
-    hours = sum(block["cpu_seconds"] for block in blocks) / 3600
+    steps, hours = _spent(blocks)
     return (
         f"The reference run: {len(seeds)} seeds a cell, {steps / 1e6:.0f} million environment steps of training in "
         f"{hours:.1f} core hours, code {commits}; its tables and manifest are in `report/reference/`."
-    )
+    ) + _further_facts(record)
+
+
+def _further_facts(record: Mapping[str, Any]) -> str:
+    """Say what the further studies and the peers of a reference run took, each block counted once; nothing without."""
+    blocks = {str(block["outputs"]): block for own in record.get("experiments", {}).values() for block in own}
+    for block in record["blocks"]:
+        blocks.pop(str(block["outputs"]), None)
+    text = ""
+    if blocks:
+        steps, hours = _spent(list(blocks.values()))
+        text += f" Its further studies took {steps / 1e6:.0f} million steps more, in {hours:.1f} core hours."
+    if record.get("peers"):
+        text += f" The peers took {_spent(record['peers'])[1]:.1f}."
+    return text
+
+
+def _spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
+    """Environment steps and core hours of blocks."""
+    return sum(block["env_steps"] for block in blocks), sum(block["cpu_seconds"] for block in blocks) / 3600
 
 
 def put_headline(readme: str, text: str) -> str:
