@@ -107,10 +107,21 @@ def cells(runs: pd.DataFrame, table: pd.DataFrame, controllers: pd.DataFrame | N
 
 
 def _compress(axes: Axes) -> None:
-    """A logarithmic scale beyond 10 on both sides where the values are spread widely, as returns that collapse are."""
-    low, high = axes.get_xlim()
-    if max(-low, high) > WIDE:
-        axes.set_xscale("symlog", linthresh=10)
+    """A logarithmic scale beyond 10 on both sides where the values are spread widely, as returns that collapse are.
+
+    Else a few ticks.
+    """
+    low, high = axes.dataLim.intervalx
+    widest = max(-low, high)
+    if widest <= WIDE:
+        axes.locator_params(axis="x", nbins=5)
+        return
+    axes.set_xscale("symlog", linthresh=10)
+    axes.set_xlim(*(3 * end if abs(end) > 10 else end + side for end, side in ((low, -5), (high, 5))))
+    step = 1 if widest < 1e5 else 3  # decades between the numbers
+    decades = [10.0**exponent for exponent in range(step, 16, step)]
+    axes.set_xticks([tick for tick in (*(-decade for decade in decades), 0.0, *decades) if low <= tick <= max(high, 0)])
+    axes.minorticks_off()
 
 
 def _controller(controllers: pd.DataFrame | None, protocol: str) -> dict[str, float]:

@@ -186,7 +186,7 @@ def _further_facts(record: Mapping[str, Any]) -> str:
         steps, hours = _spent(list(blocks.values()))
         text += f" Its further studies took {steps / 1e6:.0f} million steps more, in {hours:.1f} core hours."
     if record.get("peers"):
-        text += f" The peers took {_spent(record['peers'])[1]:.1f}."
+        text += f" The peers took {_spent(record['peers'])[1]:.1f} core hours."
     return text
 
 

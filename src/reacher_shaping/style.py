@@ -119,8 +119,9 @@ def setting_label(budget: int, alpha0: float) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """A number with a real minus sign and a fixed count of decimals."""
-    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    """A number with a real minus sign and a fixed count of decimals; from a million on with an exponent."""
+    text = f"{value:.{digits}f}" if abs(value) < 1e6 else f"{value:.1e}".replace("e+0", "e").replace("e+", "e")
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def of_protocol(frame: pd.DataFrame, protocol: str | None) -> pd.DataFrame:
