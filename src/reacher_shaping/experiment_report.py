@@ -40,6 +40,7 @@ INTROS = {
     "ablation": "From usual settings to the tuned ones, both shaped, and the tuned ones with each part of the change "
     "taken back.",
 }
+SHORT = {"success_rate": "success", "unit_return": "return", "final_distance": "distance"}
 METRICS = ("success_rate", "unit_return", "final_distance")
 NAMES = {
     "success_rate": "Success, any step",
@@ -211,13 +212,15 @@ def effects_sentence(effects: pd.DataFrame) -> str:
     found = effects[(effects["effect"] == "interaction") & (effects["p_holm"] < LEVEL)]
     if not (effects["effect"] == "interaction").any():
         return text
-    names = dict.fromkeys(
-        f"{protocol_label(row['switch'])} on {within(NAMES[row['metric']])} ({variant_label(row['variant'])})"
-        for row in found[found["metric"].isin(METRICS)].to_dict("records")
-    )
-    if not names:
+    found = found[found["metric"].isin(METRICS)]
+    if found.empty:
         return f"{text} No switch's effect depends on the others beyond chance."
-    return f"{text} What a switch does depends on the others beyond chance for {', '.join(names)}."
+    parts = []
+    for switch, own in found.groupby("switch"):
+        parts.append(
+            f"{protocol_label(str(switch))} ({', '.join(dict.fromkeys(SHORT[name] for name in own['metric']))})"
+        )
+    return f"{text} What a switch does depends on the others beyond chance for {', '.join(parts)}."
 
 
 def correlation_grid(correlation: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:

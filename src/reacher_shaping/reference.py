@@ -157,7 +157,7 @@ def headline(
     questions = [f"- {answer.question} **{answer.short}**" for answer in summary.answers]
     table = tables.to_markdown(tables.table_1(cells, published), "The six best cells of the main grid:")
     picture = f"![Success rate of every cell, with intervals and the published values]({figure})"
-    studies = [f"- **{own.title}** {' '.join(own.sentences)}" for own in further]
+    studies = [f"- **{own.title.rstrip('?')}.** {' '.join(own.sentences)}" for own in further]
     parts = [" ".join(summary.headline), "\n".join(questions), picture, table.strip()]
     parts += ["The further studies:", "\n".join(studies)] if studies else []
     parts.append(_facts(record))
