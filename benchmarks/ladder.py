@@ -24,9 +24,10 @@ class AutogradLearner(ppo.Learner):
     def __init__(self, rows, settings, adam=None):
         super().__init__(rows, settings, adam)
         self.parameter = torch.nn.Parameter(rows)
-        self.optimizer = torch.optim.Adam([self.parameter], lr=settings.learning_rate, eps=settings.adam_epsilon)
+        self.optimizer = torch.optim.Adam([self.parameter], eps=settings.adam_epsilon)
 
-    def update(self, records, shuffles):
+    def update(self, records, shuffles, learning_rate):
+        self.optimizer.param_groups[0]["lr"] = learning_rate
         for epoch in range(shuffles.shape[1]):
             for chosen in shuffles[:, epoch].split(self.settings.minibatch_size, dim=1):
                 self.optimizer.zero_grad()

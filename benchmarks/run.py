@@ -141,11 +141,11 @@ def timed_share(floor: peers.Floor, name: str) -> Workload:
 def measure_evaluation(size: Size) -> Iterator[Measure]:
     """Evaluation against a loop over gymnasium.make_vec with the same policy."""
     cell, block = size.cell(), size.block
-    weight, hidden = cell.protocol.environment.control_weight, cell.protocol.ppo.hidden_units
+    weight, network = cell.protocol.environment.control_weight, cell.protocol.ppo
     settings = {"radius": RADIUS, "control_weight": weight, "root_seed": 0, "mode": "stochastic"}
 
     def policies(seeds: int) -> Policy:
-        stack = Policy(initialise(range(seeds), 0, hidden), hidden)
+        stack = Policy(initialise(range(seeds), 0, network), network.hidden_units)
         stack.layers.log_std.fill_(TRAINED_LOG_STD)
         return stack
 
