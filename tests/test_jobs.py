@@ -77,6 +77,14 @@ def test_finished_block_leaves_no_checkpoint(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_half_a_checkpoint_of_a_killed_process_is_cleared_away(tmp_path):
+    folder = tmp_path / "key"
+    folder.mkdir()
+    (folder / ".checkpoint.abc.pt").write_bytes(b"half")
+    trained(folder, [])
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_checkpoint_stays_until_the_result_is_saved(tmp_path):
     folder = tmp_path / "key"
     with (

@@ -14,7 +14,7 @@ PLAN = Plan(2048)
 
 
 def policy_of(seeds, of=CELL):
-    return Policy(initialise(seeds, of.root_seed, of.protocol.ppo.hidden_units), of.protocol.ppo.hidden_units)
+    return Policy(initialise(seeds, of.root_seed, of.protocol.ppo), of.protocol.ppo.hidden_units)
 
 
 @pytest.fixture(scope="module")

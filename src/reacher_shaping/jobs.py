@@ -7,6 +7,7 @@ named by a hash of all that determines the training, so that a changed setting o
 from __future__ import annotations
 
 import io
+import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -63,9 +64,7 @@ def trained_block(
                 saved = time.monotonic()
         assert state is not None, "a cell has at least one iteration"
         yield state, state.iteration - start
-        checkpoint.unlink(missing_ok=True)
-        if folder.exists():
-            folder.rmdir()
+        shutil.rmtree(folder, ignore_errors=True)  # a process killed while it wrote has left a temporary file there
 
 
 def save_checkpoint(path: Path, state: TrainState, seconds: tuple[float, float] = (0.0, 0.0)) -> None:
