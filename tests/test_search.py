@@ -1,14 +1,16 @@
 """The search proposes what its space allows, follows its score, and goes on as if it had not been interrupted."""
 
 import math
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from reacher_shaping import search
 from reacher_shaping.cell import PPO, ConfigError, Protocol, Variant
-from reacher_shaping.config import Search
+from reacher_shaping.config import Search, load_study
 
+ROOT = Path(__file__).parents[1]
 L2 = Variant(name="l2", potential="l2")
 SPEC = Search.model_validate(
     {
@@ -98,3 +100,23 @@ def test_score_is_the_mean_over_seeds_of_real_runs():
     assert set(found) == set(search.MEASURES)
     assert -200 < found["mean_return"] < -5
     assert 0 <= found["final_success_rate"] <= found["success_rate"] <= 1
+
+
+def test_the_tuned_protocol_is_the_best_trial_of_the_kept_search():
+    """To the two or three digits that config.yaml writes."""
+    kept = ROOT / "report/reference/search/trials.csv"
+    if not kept.exists():
+        pytest.skip("no search is kept")
+    study = load_study(ROOT / "config.yaml")
+    trials = pd.read_csv(kept)
+    assert len(trials) == study.search.trials
+    best = trials.loc[trials["mean_return"].idxmax()]
+    protocol = study.protocols["tuned"].model_dump()
+    (shaped,) = [cell for cell in study.experiment_cells["tuned"] if cell.variant.name == study.search.variant]
+    for path in study.search.space:
+        part, _, key = path.partition(".")
+        value = protocol[part][key] if key else shaped.alpha0
+        assert value == pytest.approx(best[path], rel=0.01), path
+    for path, value in study.search.fixed.items():
+        part, _, key = path.partition(".")
+        assert protocol[part][key] == value

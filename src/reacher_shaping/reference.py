@@ -138,7 +138,8 @@ def manifest(
 def sections(kept: Path, training_logs: pd.DataFrame) -> list[experiment_report.Section]:
     """Return what the report says of the further studies kept in a folder. Raises ArtifactError."""
     given = experiments.read(str(path) for path in sorted(kept.glob("experiments/*/*.*")))
-    return [experiment_report.section(name, tables, training_logs) for name, tables in given.items()]
+    order = [*(name for name in experiment_report.TITLES if name in given), *(given.keys() - experiment_report.TITLES)]
+    return [experiment_report.section(name, given[name], training_logs) for name in order]
 
 
 def headline(
