@@ -20,9 +20,8 @@ TINY = {
 }
 FURTHER = {
     "seeds": 1,
-    "grid": [{"protocol": "released_late", "variants": ["none"], "budgets": [2048], "alpha0": [0.5]}],
     "switches": {
-        "start": "paper", "end": "standard", "settings": {"ends": ["shaping.episode_end"]},
+        "start": "standard", "end": "paper", "settings": {"ends": ["shaping.episode_end"]},
         "variants": ["none"], "budget": 2048,
     },
     "peers": {"seeds": 1, "budgets": {"ppo": 2048}},
@@ -93,6 +92,7 @@ def test_tables_have_the_columns_of_the_contract(project):
         *["seed", "iteration", "env_steps", "episode_return", "shaped_return", "episode_length", "success_rate"],
         *["final_distance", "action_std", "entropy", "approx_kl", "clip_fraction", "policy_loss", "value_loss"],
         "explained_variance",
+        "logged_return",
     ]
     assert progress[["seed", "iteration", "env_steps"]].to_numpy().tolist() == [[1, 1, 2048]]
     episodes = pd.read_parquet(block / "episodes.parquet")
@@ -286,13 +286,7 @@ def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp
         assert set(effects["effect"]) == {"all", "alone", "last", "interaction"}
         assert len(artifacts.read_table(folder / "agreement.csv", artifacts.AGREEMENT)) == 8
         runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
-        assert set(runs["protocol"]) == {
-            "paper",
-            "standard",
-            "paper_with_ends",
-            "standard_without_ends",
-            "released_late",
-        }
+        assert set(runs["protocol"]) == {"standard", "paper", "standard_with_ends", "paper_without_ends"}
         assert copy.planned("mine") == {}
         copy.run("--allowed-rules", "build_report", "--", "report/report.html")
         page = (copy.folder / "report/report.html").read_text()
