@@ -22,11 +22,13 @@ STUDY = or_stop(load_study, config)
 SETTINGS_HASH = settings_hash(STUDY)
 
 
+include: "workflow/rules/cells.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/peers.smk"
 include: "workflow/rules/analyse.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/experiment_files.smk"
 include: "workflow/rules/experiments.smk"
 include: "workflow/rules/search.smk"
 include: "workflow/rules/notebooks.smk"

@@ -1,51 +1,5 @@
 # The further studies of config.yaml, each an optional target of its name: `snakemake attribution`. Once made, they are
-# part of the report.
-from reacher_shaping.views import VIEWS, table_files, views
-
-
-def of_experiment(make):
-    """A param or input made of the cells and seeds of the experiment named by the wildcard."""
-    return lambda wildcards: make(EXPERIMENTS[wildcards.experiment], STUDY.experiments[wildcards.experiment].seeds)
-
-
-def of_blocks(file):
-    return of_experiment(lambda cells, seeds: [f"{block}/{file}" for block in blocks(cells, seeds)])
-
-
-def peers_of(experiment):
-    """Runs of other algorithms that an experiment asks for."""
-    peers = STUDY.experiments[experiment].peers
-    path = f"results/experiments/{experiment}/peers/{{algorithm}}/seed{{seed}}.parquet"
-    return expand(path, algorithm=peers.budgets, seed=range(peers.seeds)) if peers else []
-
-
-def views_of(experiment):
-    """Names of an experiment's figures."""
-    keys = [cell.key for cell in EXPERIMENTS[experiment]]
-    return views(keys, switches=STUDY.experiments[experiment].switches is not None)
-
-
-def figures_of(experiment):
-    return expand("figures/{experiment}_{view}.{kind}", experiment=experiment, view=views_of(experiment), kind=KINDS)
-
-
-def tables_of(experiment):
-    """Files of an experiment's tables."""
-    settings = STUDY.experiments[experiment]
-    files = table_files(switches=settings.switches is not None, peers=settings.peers is not None)
-    return [f"results/experiments/{experiment}/{file}" for file in files]
-
-
-def runs_of(experiment):
-    """What an experiment's tables are made of. A target names it too, as the main study's does."""
-    return [
-        f"{block}/{file}"
-        for block in blocks(EXPERIMENTS[experiment], STUDY.experiments[experiment].seeds)
-        for file in ["policy.pt", "progress.parquet", "episodes.parquet", "manifest.json"]
-    ]
-
-
-# An experiment whose tables are there is part of the report.
+# part of the report: MADE are those whose tables are there.
 MADE = [name for name in EXPERIMENTS if all(Path(path).exists() for path in tables_of(name))]
 MADE_TABLES = [path for name in MADE for path in tables_of(name)]
 MADE_FIGURES = [path for name in MADE for path in figures_of(name)]
