@@ -107,7 +107,7 @@ def _touch(folder, names):
 
 @pytest.mark.skipif(not (KEPT / "manifest.json").exists(), reason="no reference run is kept")
 def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
-    shutil.copytree(KEPT, tmp_path / "results")
+    shutil.copytree(KEPT, tmp_path / "results", ignore=shutil.ignore_patterns("experiments"))
     table = tmp_path / "results" / "peers.parquet"
     table.unlink(missing_ok=True)
     for there in (False, True):
