@@ -101,7 +101,7 @@ VIEWS = {
     "log": (
         "Training as logged",
         "What each protocol's own log shows, mean over seeds. Diamonds: peak and end of the published logs of the same "
-        "cell, their moving average over 20 iterations. Curves that collapse leave the scale.",
+        "cell, their moving average over {window} iterations. Curves that collapse leave the scale.",
     ),
     "correlation": (
         "The labels' correlations",

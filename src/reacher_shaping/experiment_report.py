@@ -13,6 +13,7 @@ import pandas as pd
 from reacher_shaping import experiment_figures, grids, tables, views
 from reacher_shaping.experiment_figures import KINDS, protocol_label, switch_label
 from reacher_shaping.grids import Grid, of_table
+from reacher_shaping.learning import WINDOW
 from reacher_shaping.style import budget_label, cell_order, number, of_protocol, setting_label, to_bytes, variant_label
 
 LEVEL = 0.05
@@ -103,8 +104,8 @@ def section(
         )
     if "log" in shown:
         found[
-            "What the protocol's own log shows while training, its moving average over 20 iterations, mean over seeds "
-            "[least, greatest]; the last column is the standard deviation of the torques at the end. Below, published "
+            f"What the protocol's own log shows while training, its moving average over {WINDOW} iterations, mean over "
+            "seeds [least, greatest]; the last column is the standard deviation of the torques at the end. Below, published "
             "runs of the same cells"
         ] = logs_grid(given["logs"], training_logs)
     if "agreement" in given:
