@@ -105,8 +105,8 @@ def section(
     if "log" in shown:
         found[
             f"What the protocol's own log shows while training, its moving average over {WINDOW} iterations, mean over "
-            "seeds [least, greatest]; the last column is the standard deviation of the torques at the end. Below, published "
-            "runs of the same cells"
+            "seeds [least, greatest]; the last column is the standard deviation of the torques at the end. Below, "
+            "published runs of the same cells"
         ] = logs_grid(given["logs"], training_logs)
     if "agreement" in given:
         said.append(agreement_sentence(given["agreement"]))
