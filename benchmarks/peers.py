@@ -19,11 +19,10 @@ from reacher_shaping.reacher import (
     ACTION_SIZE,
     EPISODE_STEPS,
     OBSERVATION_SIZE,
-    Lanes,
-    draw_reset,
     profiling_clock,
 )
-from reacher_shaping.rollout import Plan
+from reacher_shaping.rollout import Collector, Plan
+from reacher_shaping.train import TrainState
 
 CLOCK = profiling_clock()
 STOCK_CLOCK = CLOCK.value  # read at import, before any lanes switch it off
@@ -125,23 +124,29 @@ class Floor:
     """An iteration's `mj_step` calls and matrix products and nothing else."""
 
     def __init__(self, cell: Cell, seeds: int) -> None:
-        self.settings = cell.protocol.ppo
-        self.seeds = seeds
-        self.plan = Plan(self.settings.rollout_steps)
-        self.lanes = Lanes(seeds * self.plan.lanes)
+        self.cell = cell
+        self.seeds = range(seeds)
+        self.plan = Plan(cell.protocol.ppo.rollout_steps)
+        self.collector = Collector(self.seeds, cell.root_seed, self.plan)
         self.products = [
             (times, [(a, b, torch.empty(seeds, a.shape[1], b.shape[2])) for a, b in operands])
-            for times, operands in matrix_products(self.settings, seeds)
+            for times, operands in matrix_products(cell.protocol.ppo, seeds)
         ]
-        self.rng = np.random.default_rng(0)
 
-    def physics(self) -> float:
-        """CPU seconds of an iteration's `mj_step` calls, with torques of a unit Gaussian."""
-        step, model, data = mujoco.mj_step, self.lanes.model, self.lanes.data
-        self.lanes.reset([draw_reset(self.rng) for _ in data])
+    def physics(self, state: TrainState) -> float:
+        """CPU seconds of the `mj_step` calls of the iteration that the engine does next.
+
+        The torques are the policy's own: an arm at its joint limit costs more, so random ones would not do.
+        """
+        lanes, iteration = self.collector.lanes, state.iteration
+        action = self.collector.collect(state.policy(self.cell), iteration).action.reshape(
+            lanes.count, EPISODE_STEPS, -1
+        )
+        lanes.reset(self.collector.resets(iteration))
+        step, model, data = mujoco.mj_step, lanes.model, lanes.data
         seconds = 0.0
-        for _ in range(EPISODE_STEPS):
-            for lane, torque in zip(data, self.rng.normal(size=(len(data), 2)), strict=True):
+        for t in range(EPISODE_STEPS):
+            for lane, torque in zip(data, action[:, t], strict=True):
                 lane.ctrl[:] = torque
             begun = time.process_time()
             for lane in data:
@@ -159,10 +164,6 @@ class Floor:
                 for a, b, out in operands:
                     torch.bmm(a, b, out=out)
         return time.process_time() - begun
-
-    def rate(self) -> float:
-        """Environment steps per CPU second at the floor."""
-        return self.seeds * self.plan.steps / (self.physics() + self.products_seconds())
 
 
 def make_vec_evaluation(policy: Policy, control_weight: float, lanes: int, chunks: int) -> Workload:

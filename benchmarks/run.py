@@ -16,10 +16,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "tests"))  # the plain loop lives there
@@ -72,18 +74,22 @@ class Size:
 QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, blocks=(1,), quick=True)
 
 
-def iterations(iterator: Iterator[object], steps: int) -> Workload:
+@dataclass
+class Training:
     """An iteration of training a call, worth `steps` environment steps over all seeds."""
 
-    def one() -> float:
-        next(iterator)
-        return steps
+    iterations: Iterator[Any]
+    steps: int
+    state: Any = None
+    """What the last iteration left."""
 
-    return one
+    def __call__(self) -> float:
+        self.state = next(self.iterations)
+        return self.steps
 
 
-def training(cell: Cell, seeds: int) -> Workload:
-    return iterations(engine(cell, range(seeds)), seeds * cell.protocol.ppo.rollout_steps)
+def training(cell: Cell, seeds: int) -> Training:
+    return Training(engine(cell, range(seeds)), seeds * cell.protocol.ppo.rollout_steps)
 
 
 def measure_training(size: Size) -> Iterator[Measure]:
@@ -92,13 +98,15 @@ def measure_training(size: Size) -> Iterator[Measure]:
     floors = {seeds: peers.Floor(cell, seeds) for seeds in (block, 1)}
     rates: dict[str, list[float]] = {}
     names = {"engine": block, "engine of one": 1}
-    workloads: dict[str, Workload] = {name: training(cell, seeds) for name, seeds in names.items()}
+    engines = {seeds: training(cell, seeds) for seeds in names.values()}
+    workloads: dict[str, Workload] = {name: engines[seeds] for name, seeds in names.items()}
     workloads["peer"] = peers.stable_baselines(cell, shared=False)
     workloads["peer, shared trunk"] = peers.stable_baselines(cell, shared=True)
     for seeds, floor in floors.items():
-        workloads[f"physics {seeds}"] = timed_share(floor, "physics")
-        workloads[f"products {seeds}"] = timed_share(floor, "products")
-        workloads[f"physics as installed {seeds}"] = peers.as_installed()(timed_share(floor, "physics"))
+        physics = timed_share(floor, partial(physics_seconds, floor, engines[seeds]))
+        workloads[f"physics {seeds}"] = physics
+        workloads[f"products {seeds}"] = timed_share(floor, floor.products_seconds)
+        workloads[f"physics as installed {seeds}"] = peers.as_installed()(physics)
     rates = take_turns(workloads, size.repeats)
     part = "training"
     for name, seeds in names.items():
@@ -122,8 +130,12 @@ def measure_training(size: Size) -> Iterator[Measure]:
         yield measure(part, name.replace("peer", "Stable-Baselines3"), rates[name], "steps/s")
 
 
-def timed_share(floor: peers.Floor, name: str) -> Workload:
-    """Environment steps per second if this share of the floor were all there is.
+def physics_seconds(floor: peers.Floor, engine: Training) -> float:
+    return floor.physics(engine.state)
+
+
+def timed_share(floor: peers.Floor, share: Callable[[], float]) -> Workload:
+    """Environment steps per second if the seconds of `share` were all that an iteration takes.
 
     A workload's time is measured around it, so what only prepares the share is kept out by its own clock: the steps
     are scaled to the whole call.
@@ -131,9 +143,9 @@ def timed_share(floor: peers.Floor, name: str) -> Workload:
 
     def one() -> float:
         begun = time.process_time()
-        seconds = floor.physics() if name == "physics" else floor.products_seconds()
+        seconds = share()
         whole = time.process_time() - begun
-        return floor.seeds * floor.plan.steps * whole / seconds
+        return len(floor.seeds) * floor.plan.steps * whole / seconds
 
     return one
 
@@ -213,7 +225,7 @@ def measure_ladder(size: Size) -> Iterator[Measure]:
     cell = size.cell()
     steps = cell.protocol.ppo.rollout_steps
     workloads = {
-        name: iterations(iterator, seeds * steps) for name, (seeds, iterator) in rungs(cell, range(size.block)).items()
+        name: Training(iterator, seeds * steps) for name, (seeds, iterator) in rungs(cell, range(size.block)).items()
     }
     rates = take_turns(workloads, size.repeats)
     for name in rates:

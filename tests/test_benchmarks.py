@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pandas as pd
 import pytest
 import torch
@@ -53,6 +55,28 @@ def test_the_floor_holds_every_matrix_product_of_an_iteration():
         for a, b in operands
     )
     assert counter.get_total_flops() == floor
+
+
+def test_the_floor_steps_as_the_engine_does_in_its_next_iteration(monkeypatch):
+    import ladder
+    import peers
+
+    of = small("l2", iterations=2)
+    iterator = ladder.engine(of, [0, 1, 2])
+    floor, state = peers.Floor(of, 3), next(iterator)
+    step, stepped = mujoco.mj_step, []
+
+    def recording(model, data, count):
+        stepped.append([*data.qpos, *data.qvel, *data.ctrl])
+        step(model, data, count)
+
+    monkeypatch.setattr(mujoco, "mj_step", recording)
+    floor.physics(state)  # collects, then steps again
+    collected, replayed = np.split(np.array(stepped), 2)
+    stepped.clear()
+    next(iterator)
+    assert np.array_equal(replayed, stepped)
+    assert np.array_equal(collected, stepped)
 
 
 def test_quick_benchmark_writes_its_table_and_plot(tmp_path):

@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from reacher_shaping.reacher import EPISODE_STEPS, Lanes, control_cost, draw_reset, load_model, profiling_clock
+from reacher_shaping.reacher import EPISODE_STEPS, Fields, Lanes, control_cost, draw_reset, load_model, profiling_clock
 
 LANES = 20
 
@@ -108,13 +108,47 @@ def test_a_torque_that_is_not_finite_counts_as_zero_and_stays_in_its_lane():
     np.testing.assert_array_equal(lanes.observation, still.observation)
 
 
-def test_wrong_numbers_of_resets_and_actions_are_refused():
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_wrong_numbers_of_resets_and_actions_are_refused(count):
     lanes = Lanes(3)
-    with pytest.raises(ValueError, match="shorter"):
-        lanes.reset([draw_reset(np.random.default_rng(0))] * 2)
+    with pytest.raises(ValueError, match=rf"\({count}, 14\) for fields of shape \(3, 14\)"):
+        lanes.reset([draw_reset(np.random.default_rng(0))] * count)
     lanes.reset([draw_reset(np.random.default_rng(0))] * 3)
-    with pytest.raises(ValueError, match="shorter"):
-        lanes.step(np.zeros((2, 2)))
+    with pytest.raises(ValueError, match=rf"\({count}, 2\) for fields of shape \(3, 2\)"):
+        lanes.step(np.zeros((count, 2)))
+
+
+def test_fields_are_those_of_each_simulation():
+    model = load_model()
+    simulations = [mujoco.MjData(model) for _ in range(5)]
+    for number, data in enumerate(simulations):
+        data.qpos[:] = 10 * number + np.arange(4)
+        data.ctrl[:] = -number
+    fields = Fields([[data.qpos[1:3], data.ctrl] for data in simulations])
+    expected = np.array([[10 * number + 1, 10 * number + 2, -number, -number] for number in range(5)])
+    np.testing.assert_array_equal(fields.read(), expected)
+    fields.write(expected + 0.5)
+    for number, data in enumerate(simulations):
+        np.testing.assert_array_equal(data.qpos, 10 * number + np.array([0, 1.5, 2.5, 3]))
+        np.testing.assert_array_equal(data.ctrl, 0.5 - number)
+
+
+def test_a_reset_leaves_nothing_of_the_episode_before():
+    rng = np.random.default_rng(12)
+    used, fresh = Lanes(2), Lanes(2)
+    used.reset([draw_reset(rng) for _ in range(2)])
+    for _ in range(EPISODE_STEPS):
+        used.step(np.ones((2, 2)))  # to the joint limit, where the solver starts from its last forces
+    draws = [draw_reset(rng) for _ in range(2)]
+    for lanes in (used, fresh):
+        lanes.reset(draws)
+    state = int(mujoco.mjtState.mjSTATE_INTEGRATION) & ~int(mujoco.mjtState.mjSTATE_TIME)
+    size = mujoco.mj_stateSize(used.model, state)
+    for one, other in zip(used.data, fresh.data, strict=True):
+        states = np.empty((2, size))
+        mujoco.mj_getState(used.model, one, states[0], state)
+        mujoco.mj_getState(used.model, other, states[1], state)
+        np.testing.assert_array_equal(states[0], states[1])
 
 
 def test_no_pair_of_the_models_geometries_can_collide():

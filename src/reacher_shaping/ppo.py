@@ -190,7 +190,7 @@ class Learner:
         torch.bmm(hidden1.transpose(1, 2), delta, out=gradients.second)
         torch.sum(delta, 1, keepdim=True, out=gradients.second_bias)
 
-        delta = torch.bmm(delta, net.second.transpose(1, 2))
+        delta = torch.bmm(delta, net.second.transpose(1, 2), out=hidden2)  # which nothing reads from here on
         _tanh_backward(delta, hidden1)
         torch.bmm(features.transpose(1, 2), delta, out=gradients.first)
 

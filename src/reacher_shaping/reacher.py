@@ -6,12 +6,13 @@ the same reset draws and actions. Source: gymnasium/envs/mujoco/reacher_v5.py an
 """
 
 import ctypes
-from collections.abc import Iterable
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 EPISODE_STEPS = 50
@@ -80,10 +81,41 @@ def draw_reset(generator: np.random.Generator) -> tuple[Array, Array]:
     return position, velocity
 
 
+class Fields:
+    """The same fields of many simulations as one array, read and written at once.
+
+    MuJoCo allocates every simulation by itself, so their fields lie scattered in this process's memory, always at the
+    same addresses. One array that spans them all, indexed by these addresses, saves touching each of them from Python.
+    """
+
+    def __init__(self, views: Sequence[Sequence[NDArray[np.float64]]]) -> None:
+        """Bind one row of views per simulation; all rows hold as many numbers."""
+        self._views = views  # keeps the simulations alive
+        addresses = np.array([np.concatenate([_addresses(view) for view in row]) for row in views])
+        first = min((view for row in views for view in row), key=lambda view: view.ctypes.data)
+        self._index = (addresses - first.ctypes.data) // first.itemsize
+        self._memory = as_strided(first, shape=(int(self._index.max()) + 1,))
+
+    def read(self) -> Array:
+        """Return a copy of the fields, a row per simulation."""
+        values: Array = self._memory[self._index]
+        return values
+
+    def write(self, values: NDArray[np.floating]) -> None:
+        """Overwrite the fields with `values`, a row per simulation; raises ValueError for another shape than theirs."""
+        if values.shape != self._index.shape:
+            raise ValueError(f"values of shape {values.shape} for fields of shape {self._index.shape}")
+        self._memory[self._index] = values
+
+
+def _addresses(view: NDArray[np.float64]) -> NDArray[np.int64]:
+    return view.ctypes.data + np.arange(len(view)) * view.itemsize
+
+
 class Lanes:
     """N simulations in lock-step, with preallocated arrays for what is read after each step.
 
-    Attributes, valid after `reset` and refreshed by `step` (views, overwritten in place):
+    Attributes, valid after `reset` and refreshed by `step` (overwritten in place):
         observation: [N, 10] float64, Gymnasium's observation.
         distance: [N] float64, fingertip to target in m (the negative of Gymnasium's reward_dist).
     """
@@ -101,40 +133,35 @@ class Lanes:
         self.distance = np.empty(count)
         tip = self.model.body("fingertip").id
         target = self.model.body("target").id
-        self._controls = [data.ctrl for data in self.data]
-        self._angles = [data.qpos[:2] for data in self.data]
-        self._velocities = [data.qvel[:2] for data in self.data]
-        self._tips = [data.xpos[tip] for data in self.data]
-        self._targets = [data.xpos[target] for data in self.data]
-        self._angle = np.empty((count, 2))
-        self._velocity = np.empty((count, 2))
-        self._tip = np.empty((count, 3))
+        self._controls = Fields([[data.ctrl] for data in self.data])
+        self._state = Fields([[data.qpos, data.qvel, data.qacc_warmstart, data.ctrl] for data in self.data])
+        self._resting = Fields([[data.qpos[2:], data.xpos[target]] for data in self.data])
+        self._moving = Fields([[data.qpos[:2], data.qvel[:2], data.xpos[tip]] for data in self.data])
         self._target = np.empty((count, 3))
 
-    def reset(self, draws: Iterable[tuple[Array, Array]]) -> None:
+    def reset(self, draws: Sequence[tuple[Array, Array]]) -> None:
         """Start an episode in every lane from (positions [4], velocities [4]), one pair a lane.
 
-        Raises ValueError if the number of pairs is not the number of lanes.
+        All else that enters the next step is zero, as after `mj_resetData`, which clears much more. Raises ValueError
+        if the number of pairs is not the number of lanes.
         """
-        for data, (position, velocity) in zip(self.data, draws, strict=True):
-            mujoco.mj_resetData(self.model, data)
-            data.qpos[:] = position
-            data.qvel[:] = velocity
+        start = np.reshape(draws, (len(draws), -1))
+        self._state.write(np.pad(start, [(0, 0), (0, self.model.nv + self.model.nu)]))
+        for data in self.data:
             mujoco.mj_forward(self.model, data)
-        np.stack(self._targets, out=self._target)
-        np.stack([data.qpos[2:] for data in self.data], out=self.observation[:, 4:6])
+        self.observation[:, 4:6], self._target = np.split(self._resting.read(), [2], axis=1)
         self._read()
 
     def step(self, action: NDArray[np.floating]) -> None:
         """Advance every lane by one environment step with torques `action` [N, 2].
 
         Torques outside [-1, 1] are clamped by the actuators, as in Gymnasium; a torque that is not
-        finite counts as zero here (MuJoCo would do the same and warn at every step).
+        finite counts as zero here (MuJoCo would do the same and warn at every step). Raises ValueError
+        for another shape.
         """
-        action = np.where(np.isfinite(action), action, 0.0)
+        self._controls.write(np.where(np.isfinite(action), action, 0.0))
         step, model = mujoco.mj_step, self.model
-        for data, control, torque in zip(self.data, self._controls, action, strict=True):
-            control[:] = torque
+        for data in self.data:
             step(model, data, _FRAME_SKIP)
         self._read()
 
@@ -144,13 +171,11 @@ class Lanes:
         Body positions are those left by the integrator's last stage, not those of the final joint
         angles: Gymnasium's observation and reward read the same.
         """
-        np.concatenate(self._angles, out=self._angle.reshape(-1))
-        np.concatenate(self._velocities, out=self._velocity.reshape(-1))
-        np.concatenate(self._tips, out=self._tip.reshape(-1))
-        offset = self._tip - self._target
-        np.cos(self._angle, out=self.observation[:, 0:2])
-        np.sin(self._angle, out=self.observation[:, 2:4])
-        self.observation[:, 6:8] = self._velocity
+        angle, velocity, tip = np.split(self._moving.read(), [2, 4], axis=1)
+        offset = tip - self._target
+        np.cos(angle, out=self.observation[:, 0:2])
+        np.sin(angle, out=self.observation[:, 2:4])
+        self.observation[:, 6:8] = velocity
         self.observation[:, 8:10] = offset[:, :2]
         np.sqrt(np.vecdot(offset, offset), out=self.distance)
 

@@ -95,7 +95,7 @@ class Collector:
         action = np.empty((*shape, EPISODE_STEPS, ACTION_SIZE), dtype=np.float32)
         noise = self._noise(iteration)
         lanes = self.lanes
-        lanes.reset(self._resets(iteration))
+        lanes.reset(self.resets(iteration))
         for t in range(EPISODE_STEPS):
             observation[:, :, t] = lanes.observation.reshape(*shape, -1)
             distance[:, :, t] = lanes.distance.reshape(shape)
@@ -105,12 +105,13 @@ class Collector:
         distance[:, :, -1] = lanes.distance.reshape(shape)
         return Rollout(observation, distance, action, control_cost(self._applied(action)))
 
-    def _applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
-        return action.clip(-1.0, 1.0) if self.clip_actions else action
-
-    def _resets(self, iteration: int) -> list[tuple[Array, Array]]:
+    def resets(self, iteration: int) -> list[tuple[Array, Array]]:
+        """Return the start of each lane, seed by seed: (joint positions [4], joint velocities [4])."""
         generators = [stream(self.root_seed, Purpose.RESETS, seed, iteration) for seed in self.seeds]
         return [draw_reset(generator) for generator in generators for _ in range(self.plan.lanes)]
+
+    def _applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
+        return action.clip(-1.0, 1.0) if self.clip_actions else action
 
     def _noise(self, iteration: int) -> NDArray[np.float32]:
         shape = (self.plan.lanes, EPISODE_STEPS, ACTION_SIZE)
