@@ -146,6 +146,16 @@ def test_section_counts_the_differences_that_survive_holm(released):
     assert "success, any step in 0 of 4," in text
 
 
+def test_section_names_what_the_only_shaped_cell_changes(released):
+    shaped = released["comparisons"]
+    shaped = shaped[shaped["family"] == "none"].groupby("metric").head(1).assign(seeds=10, p_holm=0.5, difference=-0.01)
+    nothing = experiment_report.shaping_sentence(shaped)
+    assert nothing == "Beyond chance (Holm, 5 %) shaping changes nothing."
+    shaped.loc[shaped["metric"].isin(["final_distance", "mean_return"]), "p_holm"] = 0.01
+    text = experiment_report.shaping_sentence(shaped)
+    assert "mean return (for the worse); distance at the last step (mm) (for the better). It does not: success" in text
+
+
 def test_document_holds_every_table_and_figure(released):
     controllers = synthetic.controllers().assign(protocol="released", mode="stochastic", final_success_rate=1.0)
     curve = {"protocol": "released", "variant": "none", "alpha0": 1.0, "budget": 500_000, "episode_return": -50.0}

@@ -174,7 +174,7 @@ def best_sentence(cells: pd.DataFrame) -> str:
         for metric in ("success_rate", "final_success_rate", "mean_return")
     ]
     setting = setting_label(int(row["budget"]), row["alpha0"])
-    return f"Of these cells {name} ({setting}) has the highest success rate: {'; '.join(texts)}."
+    return f"The cell with the highest success rate is {name} ({setting}): {'; '.join(texts)}."
 
 
 def effects_grid(effects: pd.DataFrame) -> Grid:
@@ -346,16 +346,29 @@ def shaping_sentence(shaped: pd.DataFrame) -> str:
     seeds = int(shaped["seeds"].max())
     if 2.0 ** (1 - seeds) * family > LEVEL:  # the smallest p of a sign-flip test, corrected
         return f"With {seeds} seeds no difference between {family} shaped cells and none can be told from chance."
-    parts = []
-    for metric in SHAPING:
-        own = shaped[shaped["metric"] == metric].dropna(subset="p_holm")
-        apart = own[own["p_holm"] < LEVEL]
-        better = (apart["difference"] < 0).sum() if metric.endswith("distance") else (apart["difference"] > 0).sum()
-        parts.append(
-            f"{within(NAMES[metric])} in {len(apart)} of {len(own)}"
-            + (f" ({better} for the better)" if len(apart) else "")
-        )
+    tested = {metric: shaped[shaped["metric"] == metric].dropna(subset="p_holm") for metric in SHAPING}
+    apart = {metric: own[own["p_holm"] < LEVEL] for metric, own in tested.items()}
+    better = {metric: _better(metric, own["difference"]) for metric, own in apart.items()}
+    if family == 1:
+        changed = [
+            f"{within(NAMES[metric])} (for the {'better' if better[metric] else 'worse'})"
+            for metric, own in apart.items()
+            if len(own)
+        ]
+        same = [within(NAMES[metric]) for metric, own in apart.items() if own.empty]
+        text = f"Beyond chance (Holm, 5 %) shaping changes {'; '.join(changed) or 'nothing'}"
+        return f"{text}. It does not: {'; '.join(same)}." if changed and same else f"{text}."
+    parts = [
+        f"{within(NAMES[metric])} in {len(own)} of {len(tested[metric])}"
+        + (f" ({better[metric]} for the better)" if len(own) else "")
+        for metric, own in apart.items()
+    ]
     return f"Shaped cells that differ from none beyond chance (Holm, 5 %): {', '.join(parts)}."
+
+
+def _better(metric: str, differences: "pd.Series[float]") -> int:
+    """How many differences to the baseline are improvements."""
+    return int(((differences < 0) if metric.endswith("distance") else (differences > 0)).sum())
 
 
 def cells_grid(cells: pd.DataFrame) -> Grid:

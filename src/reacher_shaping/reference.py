@@ -158,7 +158,10 @@ def headline(
     questions = [f"- {answer.question} **{answer.short}**" for answer in summary.answers]
     table = tables.to_markdown(tables.table_1(cells, published), "The six best cells of the main grid:")
     picture = f"![Success rate of every cell, with intervals and the published values]({figure})"
-    studies = [f"- **{own.title.rstrip('?')}.** {' '.join(own.sentences)}" for own in further]
+    studies = [
+        f"- **{own.title.rstrip('?')}.** {' '.join(own.sentences)} {_took(record['experiments'][own.name])}"
+        for own in further
+    ]
     parts = [" ".join(summary.headline), "\n".join(questions), picture, table.strip()]
     parts += ["The further studies:", "\n".join(studies)] if studies else []
     parts.append(_facts(record))
@@ -189,6 +192,12 @@ def _further_facts(record: Mapping[str, Any]) -> str:
     if record.get("peers"):
         text += f" The peers took {_spent(record['peers'])[1]:.1f} core hours."
     return text
+
+
+def _took(blocks: Sequence[Mapping[str, Any]]) -> str:
+    """Say what the blocks of one further study took, those included that another study trained."""
+    steps, hours = _spent(blocks)
+    return f"({steps / 1e6:.0f} million steps, {60 * hours:.0f} core minutes of training)"
 
 
 def _spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
