@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -39,6 +40,8 @@ class Project:
         environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         command = [sys.executable, *arguments]
+        # What a shell runs in the background ignores Ctrl-C, and so would all it starts.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         return subprocess.Popen(command, cwd=self.folder, env=environment, start_new_session=True, **streams)
 
     def python(self, *arguments: str) -> subprocess.CompletedProcess:
