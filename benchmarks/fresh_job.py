@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from reacher_shaping import artifacts, jobs
+from reacher_shaping import artifacts, jobs, schemas
 from reacher_shaping.cell import Cell
 from reacher_shaping.provenance import Record
 from reacher_shaping.rollout import Collector
@@ -34,7 +34,7 @@ with tempfile.TemporaryDirectory() as folder:
     block = Path(folder)
     with jobs.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
         artifacts.write_policy(block / "policy.pt", list(seeds), state.policy(cell).weights(), {})
-        artifacts.write_table(block / "progress.parquet", state.progress_frame(), artifacts.PROGRESS)
+        artifacts.write_table(block / "progress.parquet", state.progress_frame(), schemas.PROGRESS)
 # Not getrusage: its peak starts from that of the process that started this one.
 peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
 print(json.dumps([*collected[0], int(peak.split()[1]) / 1024]))

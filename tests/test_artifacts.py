@@ -12,7 +12,8 @@ import torch
 from stable_baselines3.common.monitor import load_results
 
 from reacher_shaping import artifacts
-from reacher_shaping.artifacts import EPISODES, PROGRESS, ArtifactError
+from reacher_shaping.artifacts import ArtifactError
+from reacher_shaping.schemas import EPISODES, PROGRESS
 
 
 def episodes(**columns):

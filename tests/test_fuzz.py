@@ -14,7 +14,7 @@ from cells import small
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from reacher_shaping import artifacts, jobs
+from reacher_shaping import artifacts, jobs, schemas
 from reacher_shaping.artifacts import ArtifactError
 from reacher_shaping.cell import PPO, ConfigError
 from reacher_shaping.config import Study, load_study
@@ -145,7 +145,7 @@ def stored(tmp_path_factory) -> Path:
     jobs.save_checkpoint(folder / "checkpoint.pt", state)
     policy = Policy(initialise([0, 1], 0, PPO(hidden_units=64)), 64)
     artifacts.write_policy(folder / "policy.pt", [0, 1], policy.weights(), {"cell": cell.settings()})
-    artifacts.write_table(folder / "progress.parquet", state.progress_frame(), artifacts.PROGRESS)
+    artifacts.write_table(folder / "progress.parquet", state.progress_frame(), schemas.PROGRESS)
     return folder
 
 
@@ -183,11 +183,11 @@ def test_damaged_checkpoint_is_never_gone_on_from(stored, damage):
 @given(damage=mutations())
 def test_damaged_table_is_refused_or_read_as_it_was(stored, damage):
     content = (stored / "progress.parquet").read_bytes()
-    whole = artifacts.read_table(stored / "progress.parquet", artifacts.PROGRESS)
+    whole = artifacts.read_table(stored / "progress.parquet", schemas.PROGRESS)
     path = stored / "damaged.parquet"
     path.write_bytes(damage(content))
     try:
-        found = artifacts.read_table(path, artifacts.PROGRESS)
+        found = artifacts.read_table(path, schemas.PROGRESS)
     except ArtifactError as error:
         assert str(path) in str(error)
         assert "\n" not in str(error)

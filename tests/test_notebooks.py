@@ -12,7 +12,7 @@ import papermill
 import pytest
 import synthetic
 
-from reacher_shaping import artifacts, comparisons, curves, lottery, notebooks
+from reacher_shaping import artifacts, comparisons, curves, lottery, notebooks, schemas
 
 SOURCES = sorted((Path(__file__).parents[1] / "workflow" / "notebooks").glob("*.py"))
 IDS = [path.stem for path in SOURCES]
@@ -26,26 +26,26 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     results = folder / "results"
     grid = synthetic.TOY_GRID
-    artifacts.write_table(results / "cells.parquet", synthetic.cells(grid, 2), artifacts.CELLS)
-    artifacts.write_table(results / "runs.parquet", synthetic.runs(grid, 2), artifacts.RUNS)
+    artifacts.write_table(results / "cells.parquet", synthetic.cells(grid, 2), schemas.CELLS)
+    artifacts.write_table(results / "runs.parquet", synthetic.runs(grid, 2), schemas.RUNS)
     lines = curves.curve_table(synthetic.progress(grid, 2))
-    artifacts.write_table(results / "curves.parquet", lines, artifacts.CURVES)
-    artifacts.write_table(results / "correlation.csv", synthetic.correlation(), artifacts.CORRELATION)
+    artifacts.write_table(results / "curves.parquet", lines, schemas.CURVES)
+    artifacts.write_table(results / "correlation.csv", synthetic.correlation(), schemas.CORRELATION)
     published = synthetic.correlation().assign(protocol="published")
-    artifacts.write_table(results / "correlation_published.csv", published, artifacts.CORRELATION)
-    artifacts.write_table(results / "claims.csv", synthetic.claims(), artifacts.CLAIMS)
+    artifacts.write_table(results / "correlation_published.csv", published, schemas.CORRELATION)
+    artifacts.write_table(results / "claims.csv", synthetic.claims(), schemas.CLAIMS)
     runs = synthetic.runs(grid, 2)
-    artifacts.write_table(results / "comparisons.parquet", comparisons.comparison_frame(runs, 0), artifacts.COMPARISONS)
-    artifacts.write_table(results / "variance.parquet", comparisons.variance_frame(runs), artifacts.VARIANCE)
+    artifacts.write_table(results / "comparisons.parquet", comparisons.comparison_frame(runs, 0), schemas.COMPARISONS)
+    artifacts.write_table(results / "variance.parquet", comparisons.variance_frame(runs), schemas.VARIANCE)
     power = comparisons.power_frame(runs, synthetic.published())
-    artifacts.write_table(results / "power.parquet", power, artifacts.POWER)
+    artifacts.write_table(results / "power.parquet", power, schemas.POWER)
     studies = lottery.single_seed_studies(runs, np.random.default_rng(0), 10)
-    artifacts.write_table(results / "lottery.csv", lottery.lottery_frame(studies), artifacts.LOTTERY)
-    artifacts.write_table(results / "winners.csv", lottery.winners_frame(studies), artifacts.WINNERS)
-    artifacts.write_table(results / "spread.csv", lottery.spread_frame(studies), artifacts.SPREAD)
+    artifacts.write_table(results / "lottery.csv", lottery.lottery_frame(studies), schemas.LOTTERY)
+    artifacts.write_table(results / "winners.csv", lottery.winners_frame(studies), schemas.WINNERS)
+    artifacts.write_table(results / "spread.csv", lottery.spread_frame(studies), schemas.SPREAD)
     radii, lengths = (synthetic.over(grid, 2, *more) for more in (("radius", (0.01, 0.02)), ("steps", (50, 100))))
-    artifacts.write_table(results / "radii.parquet", radii, artifacts.RADII)
-    artifacts.write_table(results / "lengths.parquet", lengths, artifacts.LENGTHS)
+    artifacts.write_table(results / "radii.parquet", radii, schemas.RADII)
+    artifacts.write_table(results / "lengths.parquet", lengths, schemas.LENGTHS)
     (folder / "published").mkdir()
     for name in ("table2.csv", "table3.csv"):
         (folder / "published" / name).write_bytes((synthetic.PUBLISHED / name).read_bytes())

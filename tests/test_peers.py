@@ -12,7 +12,7 @@ import pytest
 import synthetic
 from cells import cell
 
-from reacher_shaping import artifacts, meter, peers
+from reacher_shaping import artifacts, meter, peers, schemas
 from reacher_shaping.config import Evaluation
 from reacher_shaping.streams import Purpose, stream
 
@@ -67,8 +67,8 @@ def test_training_tells_speed_and_time_left(monkeypatch):
 
 def test_runs_fit_their_table(tmp_path):
     run = peers.peer_run("sac", 0, 110, cell("none").protocol, EVALUATION, root_seed=0)
-    artifacts.write_table(tmp_path / "peers.parquet", run, artifacts.PEERS)
-    assert artifacts.read_table(tmp_path / "peers.parquet", artifacts.PEERS).equals(run)
+    artifacts.write_table(tmp_path / "peers.parquet", run, schemas.PEERS)
+    assert artifacts.read_table(tmp_path / "peers.parquet", schemas.PEERS).equals(run)
 
 
 def _snakemake(folder, *arguments):
@@ -112,7 +112,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     table.unlink(missing_ok=True)
     for there in (False, True):
         if there:
-            artifacts.write_table(table, synthetic.peers(), artifacts.PEERS)
+            artifacts.write_table(table, synthetic.peers(), schemas.PEERS)
         jobs = _planned(tmp_path)
         assert ("results/peers.parquet" in jobs["plot_further"][0]) is there
         assert ("figures/peers.svg" in jobs["plot_further"][1]) is there
@@ -125,7 +125,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     other.write_text("seeds: 77\n")
     rules = ["judge_claims", "plot_further", "build_reference_report"]
     _snakemake(tmp_path, "--configfile", other, "--forcerun", "judge_claims", "--allowed-rules", *rules)
-    claims = artifacts.read_table(tmp_path / "results" / "claims.csv", artifacts.CLAIMS).set_index("id")
+    claims = artifacts.read_table(tmp_path / "results" / "claims.csv", schemas.CLAIMS).set_index("id")
     assert claims.loc["C19", "verdict"] != "untestable"
     assert (tmp_path / "figures" / "peers.svg").exists()
     report = (tmp_path / "report" / "reference.html").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import synthetic
 
-from reacher_shaping import artifacts, bars, reference, style, tables, views
+from reacher_shaping import artifacts, bars, reference, schemas, style, tables, views
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "report" / "reference"
@@ -70,7 +70,7 @@ def test_tables_kept_are_those_of_the_run(tmp_path):
     reference.keep_tables(KEPT, tmp_path)
     for name in reference.TABLES:
         assert (tmp_path / name).exists(), name
-    assert read("cells.parquet").equals(artifacts.read_table(tmp_path / "cells.parquet", artifacts.CELLS))
+    assert read("cells.parquet").equals(artifacts.read_table(tmp_path / "cells.parquet", schemas.CELLS))
 
 
 @needs_reference
@@ -78,9 +78,9 @@ def test_peers_are_kept_where_the_run_has_them_and_go_where_it_has_none(tmp_path
     results, kept = tmp_path / "results", tmp_path / "kept"
     shutil.copytree(KEPT, results)
     (results / "peers.parquet").unlink(missing_ok=True)
-    artifacts.write_table(results / "peers.parquet", synthetic.peers(), artifacts.PEERS)
+    artifacts.write_table(results / "peers.parquet", synthetic.peers(), schemas.PEERS)
     reference.keep_tables(results, kept)
-    assert artifacts.read_table(kept / "peers.parquet", artifacts.PEERS).equals(synthetic.peers())
+    assert artifacts.read_table(kept / "peers.parquet", schemas.PEERS).equals(synthetic.peers())
     (results / "peers.parquet").unlink()
     reference.keep_tables(results, kept)
     assert not (kept / "peers.parquet").exists()
@@ -92,7 +92,7 @@ def test_further_studies_that_were_made_are_kept(tmp_path):
     results, kept = tmp_path / "results", tmp_path / "kept"
     shutil.copytree(KEPT, results / "experiments" / "mine")
     logs = pd.DataFrame({"protocol": ["a"], "variant": ["none"], "budget": [1], "alpha0": [1.0], "seed": [0]})
-    artifacts.write_table(results / "experiments/mine/logs.parquet", logs, artifacts.LOGS)
+    artifacts.write_table(results / "experiments/mine/logs.parquet", logs, schemas.LOGS)
     shutil.copy(KEPT / "curves.parquet", results / "experiments/mine/logged.parquet")
     (kept / "experiments" / "old").mkdir(parents=True)
     files = views.table_files(switches=False, peers=False)

@@ -7,7 +7,7 @@ import pytest
 from project import Project
 from rocrate.rocrate import ROCrate
 
-from reacher_shaping import artifacts
+from reacher_shaping import artifacts, schemas
 
 TINY = {
     "seeds": 2,
@@ -282,10 +282,10 @@ def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp
         assert not [path for path in shared if path.startswith(f"{NONE}/seeds0-0/")]  # trained for the main study
         copy.run("mine")
         folder = copy.folder / "results/experiments/mine"
-        effects = artifacts.read_table(folder / "effects.csv", artifacts.EFFECTS)
+        effects = artifacts.read_table(folder / "effects.csv", schemas.EFFECTS)
         assert set(effects["effect"]) == {"all", "alone", "last", "interaction"}
-        assert len(artifacts.read_table(folder / "agreement.csv", artifacts.AGREEMENT)) == 8
-        runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
+        assert len(artifacts.read_table(folder / "agreement.csv", schemas.AGREEMENT)) == 8
+        runs = artifacts.read_table(folder / "runs.parquet", schemas.RUNS)
         assert set(runs["protocol"]) == {"standard", "paper", "standard_with_ends", "paper_without_ends"}
         assert copy.planned("mine") == {}
         copy.run("--allowed-rules", "build_report", "--", "report/report.html")

@@ -6,12 +6,12 @@ python workflow/compare_reference.py [RESULTS]
 import sys
 from pathlib import Path
 
-from reacher_shaping import artifacts, reference
+from reacher_shaping import artifacts, reference, schemas
 
 results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
 try:
     runs, kept = (
-        artifacts.read_table(folder / "runs.parquet", artifacts.RUNS) for folder in (results, Path("report/reference"))
+        artifacts.read_table(folder / "runs.parquet", schemas.RUNS) for folder in (results, Path("report/reference"))
     )
 except artifacts.ArtifactError as error:
     sys.exit(str(error))

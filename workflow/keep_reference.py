@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 from snakemake.utils import update_config
 
-from reacher_shaping import artifacts, reference, tables
+from reacher_shaping import artifacts, reference, schemas, tables
 from reacher_shaping.cell import Cell
 from reacher_shaping.config import block_name, load_study, require_mapping, settings_hash
 from reacher_shaping.views import table_files
@@ -48,8 +48,8 @@ def main() -> None:
     artifacts.write_json(KEPT / "manifest.json", record)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 
-    cells = artifacts.read_table(KEPT / "cells.parquet", artifacts.CELLS)
-    claims = artifacts.read_table(KEPT / "claims.csv", artifacts.CLAIMS)
+    cells = artifacts.read_table(KEPT / "cells.parquet", schemas.CELLS)
+    claims = artifacts.read_table(KEPT / "claims.csv", schemas.CLAIMS)
     published = tables.published_cells(*(pd.read_csv(f"report/published/table{number}.csv") for number in (2, 3)))
     logs = pd.read_csv("report/published/training_logs.csv")
     text = reference.headline(cells, claims, published, record, f"{KEPT}/{FIGURE}", reference.sections(KEPT, logs))

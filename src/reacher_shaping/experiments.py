@@ -21,22 +21,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reacher_shaping import artifacts, learning, stats
+from reacher_shaping import artifacts, learning, schemas, stats
 from reacher_shaping.aggregate import CORRELATED, KEY, correlations, generator, in_table_2
 from reacher_shaping.cell import Protocol
 from reacher_shaping.config import Switches
 
 SCHEMAS = {
-    "runs": artifacts.RUNS,
-    "cells": artifacts.CELLS,
-    "curves": artifacts.CURVES,
-    "logs": artifacts.LOGS,
-    "logged": artifacts.CURVES,
-    "comparisons": artifacts.COMPARISONS,
-    "correlation": artifacts.CORRELATION,
-    "controllers": artifacts.CONTROLLERS,
-    "effects": artifacts.EFFECTS,
-    "agreement": artifacts.AGREEMENT,
+    "runs": schemas.RUNS,
+    "cells": schemas.CELLS,
+    "curves": schemas.CURVES,
+    "logs": schemas.LOGS,
+    "logged": schemas.CURVES,
+    "comparisons": schemas.COMPARISONS,
+    "correlation": schemas.CORRELATION,
+    "controllers": schemas.CONTROLLERS,
+    "effects": schemas.EFFECTS,
+    "agreement": schemas.AGREEMENT,
 }
 """The tables of a further study by the names of their files, see `views.table_files`."""
 

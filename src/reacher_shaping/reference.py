@@ -8,31 +8,31 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping import answers, artifacts, experiment_report, experiments, stats, tables
+from reacher_shaping import answers, artifacts, experiment_report, experiments, schemas, stats, tables
 from reacher_shaping.aggregate import KEY
 
 TABLES = {
-    "runs.parquet": artifacts.RUNS,
-    "cells.parquet": artifacts.CELLS,
-    "curves.parquet": artifacts.CURVES,
-    "correlation.csv": artifacts.CORRELATION,
-    "correlation_published.csv": artifacts.CORRELATION,
-    "claims.csv": artifacts.CLAIMS,
-    "claim_parts.csv": artifacts.CLAIM_PARTS,
-    "controllers.parquet": artifacts.CONTROLLERS,
-    "radii.parquet": artifacts.RADII,
-    "long_episodes.parquet": artifacts.ALL_LONG_EPISODES,
-    "lengths.parquet": artifacts.LENGTHS,
-    "comparisons.parquet": artifacts.COMPARISONS,
-    "variance.parquet": artifacts.VARIANCE,
-    "power.parquet": artifacts.POWER,
-    "lottery.csv": artifacts.LOTTERY,
-    "winners.csv": artifacts.WINNERS,
-    "spread.csv": artifacts.SPREAD,
+    "runs.parquet": schemas.RUNS,
+    "cells.parquet": schemas.CELLS,
+    "curves.parquet": schemas.CURVES,
+    "correlation.csv": schemas.CORRELATION,
+    "correlation_published.csv": schemas.CORRELATION,
+    "claims.csv": schemas.CLAIMS,
+    "claim_parts.csv": schemas.CLAIM_PARTS,
+    "controllers.parquet": schemas.CONTROLLERS,
+    "radii.parquet": schemas.RADII,
+    "long_episodes.parquet": schemas.ALL_LONG_EPISODES,
+    "lengths.parquet": schemas.LENGTHS,
+    "comparisons.parquet": schemas.COMPARISONS,
+    "variance.parquet": schemas.VARIANCE,
+    "power.parquet": schemas.POWER,
+    "lottery.csv": schemas.LOTTERY,
+    "winners.csv": schemas.WINNERS,
+    "spread.csv": schemas.SPREAD,
 }
 """The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
 
-OPTIONAL = {"peers.parquet": artifacts.PEERS, "search/trials.csv": artifacts.TRIALS}
+OPTIONAL = {"peers.parquet": schemas.PEERS, "search/trials.csv": schemas.TRIALS}
 """Tables that are kept with it where the run has them."""
 
 COMPARED = ("success_rate", "mean_return")
@@ -69,7 +69,7 @@ def keep_experiments(results: Path, kept: Path, files: Mapping[str, Sequence[str
     return made
 
 
-def _keep(source: Path, target: Path, table: artifacts.Table) -> None:
+def _keep(source: Path, target: Path, table: schemas.Table) -> None:
     artifacts.write_table(target, artifacts.read_table(source, table), table, sealed=False)
 
 

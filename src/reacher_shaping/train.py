@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from reacher_shaping import advantage, ppo, shaping
-from reacher_shaping.artifacts import MEASURES
 from reacher_shaping.cell import PPO, Cell
 from reacher_shaping.policy import Policy, forward, initialise, inputs
 from reacher_shaping.reacher import ACTION_SIZE, EPISODE_STEPS
 from reacher_shaping.rollout import Collector, Plan, Rollout, environment_reward
+from reacher_shaping.schemas import MEASURES
 from reacher_shaping.streams import Purpose, stream
 
 Array = NDArray[np.float64]

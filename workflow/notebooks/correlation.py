@@ -25,14 +25,14 @@ from pathlib import Path
 
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, plots, style
+from reacher_shaping import artifacts, captions, plots, schemas, style
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
-ours = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
-published_correlation = artifacts.read_table(folder / "correlation_published.csv", artifacts.CORRELATION)
+cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
+ours = artifacts.read_table(folder / "correlation.csv", schemas.CORRELATION)
+published_correlation = artifacts.read_table(folder / "correlation_published.csv", schemas.CORRELATION)
 
 # %% [markdown]
 # Beside ours: the same code applied to the published Table 2.

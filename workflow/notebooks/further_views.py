@@ -27,21 +27,21 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, further, grids, precision, style, tables
+from reacher_shaping import artifacts, captions, further, grids, precision, schemas, style, tables
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
-runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
-comparisons = artifacts.read_table(folder / "comparisons.parquet", artifacts.COMPARISONS)
-radii = artifacts.read_table(folder / "radii.parquet", artifacts.RADII)
-lengths = artifacts.read_table(folder / "lengths.parquet", artifacts.LENGTHS)
-power = artifacts.read_table(folder / "power.parquet", artifacts.POWER)
-variance = artifacts.read_table(folder / "variance.parquet", artifacts.VARIANCE)
-lottery = artifacts.read_table(folder / "lottery.csv", artifacts.LOTTERY)
-winners = artifacts.read_table(folder / "winners.csv", artifacts.WINNERS)
-spread = artifacts.read_table(folder / "spread.csv", artifacts.SPREAD)
+cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
+runs = artifacts.read_table(folder / "runs.parquet", schemas.RUNS)
+comparisons = artifacts.read_table(folder / "comparisons.parquet", schemas.COMPARISONS)
+radii = artifacts.read_table(folder / "radii.parquet", schemas.RADII)
+lengths = artifacts.read_table(folder / "lengths.parquet", schemas.LENGTHS)
+power = artifacts.read_table(folder / "power.parquet", schemas.POWER)
+variance = artifacts.read_table(folder / "variance.parquet", schemas.VARIANCE)
+lottery = artifacts.read_table(folder / "lottery.csv", schemas.LOTTERY)
+winners = artifacts.read_table(folder / "winners.csv", schemas.WINNERS)
+spread = artifacts.read_table(folder / "spread.csv", schemas.SPREAD)
 theirs = tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),

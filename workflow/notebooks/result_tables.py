@@ -26,12 +26,12 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown
 
-from reacher_shaping import artifacts, captions, tables
+from reacher_shaping import artifacts, captions, schemas, tables
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
+cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
 theirs = tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),

@@ -32,18 +32,18 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import answers, artifacts, captions, plots, style, tables
+from reacher_shaping import answers, artifacts, captions, plots, schemas, style, tables
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
-runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
-lines = artifacts.read_table(folder / "curves.parquet", artifacts.CURVES)
-correlation = artifacts.read_table(folder / "correlation.csv", artifacts.CORRELATION)
-published_correlation = artifacts.read_table(folder / "correlation_published.csv", artifacts.CORRELATION)
+cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
+runs = artifacts.read_table(folder / "runs.parquet", schemas.RUNS)
+lines = artifacts.read_table(folder / "curves.parquet", schemas.CURVES)
+correlation = artifacts.read_table(folder / "correlation.csv", schemas.CORRELATION)
+published_correlation = artifacts.read_table(folder / "correlation_published.csv", schemas.CORRELATION)
 claims_file = folder / "claims.csv"
-claims = artifacts.read_table(claims_file, artifacts.CLAIMS) if claims_file.exists() else None
+claims = artifacts.read_table(claims_file, schemas.CLAIMS) if claims_file.exists() else None
 theirs = tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),

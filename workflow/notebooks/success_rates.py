@@ -26,13 +26,13 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, further, plots, style, tables
+from reacher_shaping import artifacts, captions, further, plots, schemas, style, tables
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
-runs = artifacts.read_table(folder / "runs.parquet", artifacts.RUNS)
+cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
+runs = artifacts.read_table(folder / "runs.parquet", schemas.RUNS)
 theirs = tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),

@@ -25,13 +25,13 @@ from pathlib import Path
 
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, plots, style
+from reacher_shaping import artifacts, captions, plots, schemas, style
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", artifacts.CELLS)
-lines = artifacts.read_table(folder / "curves.parquet", artifacts.CURVES)
+cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
+lines = artifacts.read_table(folder / "curves.parquet", schemas.CURVES)
 
 # %% [markdown]
 # ## Constant and decayed shaping with the plain distance, and L2² with a constant weight

@@ -3,7 +3,7 @@
 import pandas as pd
 from job import logged
 
-from reacher_shaping import aggregate, artifacts, curves
+from reacher_shaping import aggregate, artifacts, curves, schemas
 from reacher_shaping.provenance import unchanged
 
 params, output = snakemake.params, snakemake.output
@@ -13,15 +13,15 @@ with logged(snakemake.log[0]):
     blocks = (
         (
             cell,
-            artifacts.read_table(unchanged(progress), artifacts.PROGRESS),
-            artifacts.read_table(unchanged(episodes), artifacts.EPISODES),
+            artifacts.read_table(unchanged(progress), schemas.PROGRESS),
+            artifacts.read_table(unchanged(episodes), schemas.EPISODES),
         )
         for cell, progress, episodes in files
     )
     runs = aggregate.runs_frame(blocks)
     progress = pd.concat(
-        [artifacts.read_table(path, artifacts.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
+        [artifacts.read_table(path, schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
     )
-    artifacts.write_table(output.runs, runs, artifacts.RUNS)
-    artifacts.write_table(output.cells, aggregate.cells_frame(runs, params.root_seed), artifacts.CELLS)
-    artifacts.write_table(output.curves, curves.curve_table(progress), artifacts.CURVES)
+    artifacts.write_table(output.runs, runs, schemas.RUNS)
+    artifacts.write_table(output.cells, aggregate.cells_frame(runs, params.root_seed), schemas.CELLS)
+    artifacts.write_table(output.curves, curves.curve_table(progress), schemas.CURVES)

@@ -7,7 +7,7 @@ import pandas as pd
 import yaml
 from job import logged
 
-from reacher_shaping import artifacts, experiments, report, tables
+from reacher_shaping import artifacts, experiments, report, schemas, tables
 
 given, params = snakemake.input, snakemake.params
 
@@ -24,16 +24,16 @@ with logged(snakemake.log[0]):
     inputs = report.Inputs(
         study=told["study"],
         settings_hash=told["settings_hash"],
-        cells=artifacts.read_table(given.cells, artifacts.CELLS),
-        runs=artifacts.read_table(given.runs, artifacts.RUNS),
-        correlation=artifacts.read_table(given.correlation, artifacts.CORRELATION),
-        claims=artifacts.read_table(given.claims, artifacts.CLAIMS),
-        controllers=artifacts.read_table(given.controllers, artifacts.CONTROLLERS),
-        power=artifacts.read_table(given.power, artifacts.POWER),
-        variance=artifacts.read_table(given.variance, artifacts.VARIANCE),
-        winners=artifacts.read_table(given.winners, artifacts.WINNERS),
-        spread=artifacts.read_table(given.spread, artifacts.SPREAD),
-        peers=artifacts.read_table(given.peers[0], artifacts.PEERS) if given.peers else None,
+        cells=artifacts.read_table(given.cells, schemas.CELLS),
+        runs=artifacts.read_table(given.runs, schemas.RUNS),
+        correlation=artifacts.read_table(given.correlation, schemas.CORRELATION),
+        claims=artifacts.read_table(given.claims, schemas.CLAIMS),
+        controllers=artifacts.read_table(given.controllers, schemas.CONTROLLERS),
+        power=artifacts.read_table(given.power, schemas.POWER),
+        variance=artifacts.read_table(given.variance, schemas.VARIANCE),
+        winners=artifacts.read_table(given.winners, schemas.WINNERS),
+        spread=artifacts.read_table(given.spread, schemas.SPREAD),
+        peers=artifacts.read_table(given.peers[0], schemas.PEERS) if given.peers else None,
         experiments=experiments.read(given.experiments),
         training_logs=pd.read_csv(given.training_logs),
         published=tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3)),

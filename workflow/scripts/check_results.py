@@ -2,13 +2,13 @@
 
 from job import logged
 
-from reacher_shaping import artifacts, checks
+from reacher_shaping import artifacts, checks, schemas
 
 params = snakemake.params
 
 with logged(snakemake.log[0]):
-    runs = artifacts.read_table(snakemake.input.runs, artifacts.RUNS)
-    cells = artifacts.read_table(snakemake.input.cells, artifacts.CELLS)
+    runs = artifacts.read_table(snakemake.input.runs, schemas.RUNS)
+    cells = artifacts.read_table(snakemake.input.cells, schemas.CELLS)
     problems = checks.problems(runs, cells, params.cells, seeds=params.seeds, episodes=params.episodes)
     if problems:
         raise ValueError("; ".join(problems))

@@ -7,7 +7,7 @@ import pandas as pd
 import torch
 from job import logged
 
-from reacher_shaping import artifacts
+from reacher_shaping import artifacts, schemas
 from reacher_shaping.cell import Environment
 from reacher_shaping.config import Evaluation
 from reacher_shaping.evaluate import evaluate
@@ -37,7 +37,7 @@ with logged(snakemake.log[0]):
         for mode in ("stochastic", "deterministic")
     ]
     episodes = pd.concat(frames, ignore_index=True)
-    artifacts.write_table(snakemake.output.episodes, episodes, artifacts.EPISODES)
+    artifacts.write_table(snakemake.output.episodes, episodes, schemas.EPISODES)
     files = [Path(snakemake.output.episodes)]
     part = record.to_dict(block, [Path(snakemake.input.policy)], files, 50 * len(episodes), snakemake.threads)
     part = {"settings": json.loads(params.evaluation), "code": params.code, **part}

@@ -6,7 +6,7 @@ import pandas as pd
 import torch
 from job import logged
 
-from reacher_shaping import artifacts
+from reacher_shaping import artifacts, schemas
 from reacher_shaping.cell import Protocol
 from reacher_shaping.config import Evaluation
 from reacher_shaping.controllers import evaluate_controllers
@@ -28,4 +28,4 @@ with logged(snakemake.log[0]):
         ).assign(protocol=protocol.name)
         for protocol in protocols
     ]
-    artifacts.write_table(snakemake.output[0], pd.concat(rows, ignore_index=True), artifacts.CONTROLLERS)
+    artifacts.write_table(snakemake.output[0], pd.concat(rows, ignore_index=True), schemas.CONTROLLERS)

@@ -3,7 +3,7 @@
 import torch
 from job import logged
 
-from reacher_shaping import artifacts
+from reacher_shaping import artifacts, schemas
 from reacher_shaping.cell import Environment
 from reacher_shaping.config import Evaluation
 from reacher_shaping.long_episodes import evaluate_lengths
@@ -25,4 +25,4 @@ with logged(snakemake.log[0]):
         clip_actions=environment.clip_actions,
         root_seed=params.root_seed,
     )
-    artifacts.write_table(snakemake.output[0], long, artifacts.LONG_EPISODES)
+    artifacts.write_table(snakemake.output[0], long, schemas.LONG_EPISODES)

@@ -5,11 +5,11 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, captions, tables
+from reacher_shaping import artifacts, captions, schemas, tables
 
 with logged(snakemake.log[0]):
-    cells = artifacts.read_table(snakemake.input.cells, artifacts.CELLS)
-    runs = artifacts.read_table(snakemake.input.runs, artifacts.RUNS)
+    cells = artifacts.read_table(snakemake.input.cells, schemas.CELLS)
+    runs = artifacts.read_table(snakemake.input.runs, schemas.RUNS)
     published = tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))
     frames = {
         "table_1": tables.table_1(cells, published),

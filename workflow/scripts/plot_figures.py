@@ -5,16 +5,16 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, bars, plots, style, tables
+from reacher_shaping import artifacts, bars, plots, schemas, style, tables
 
 given = snakemake.input
 
 with logged(snakemake.log[0]):
-    cells = artifacts.read_table(given.cells, artifacts.CELLS)
-    curves = artifacts.read_table(given.curves, artifacts.CURVES)
-    correlation = artifacts.read_table(given.correlation, artifacts.CORRELATION)
-    theirs = artifacts.read_table(given.published_correlation, artifacts.CORRELATION)
-    controllers = artifacts.read_table(given.controllers, artifacts.CONTROLLERS)
+    cells = artifacts.read_table(given.cells, schemas.CELLS)
+    curves = artifacts.read_table(given.curves, schemas.CURVES)
+    correlation = artifacts.read_table(given.correlation, schemas.CORRELATION)
+    theirs = artifacts.read_table(given.published_correlation, schemas.CORRELATION)
+    controllers = artifacts.read_table(given.controllers, schemas.CONTROLLERS)
     published = tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     figures = {
         "figure_1": plots.figure_1(curves),

@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 from job import logged
 
-from reacher_shaping import artifacts, search
+from reacher_shaping import artifacts, schemas, search
 from reacher_shaping.cell import Protocol, Variant
 from reacher_shaping.config import Evaluation, Search
 from reacher_shaping.meter import Meter
@@ -29,11 +29,11 @@ def measure(values: search.Values) -> search.Values:
 
 with logged(snakemake.log[0]) as say:
     torch.set_num_threads(1)
-    done = artifacts.read_table(kept, artifacts.TRIALS).head(spec.trials) if kept.exists() else None
+    done = artifacts.read_table(kept, schemas.TRIALS).head(spec.trials) if kept.exists() else None
     meter = Meter(spec.trials, spec.seeds * spec.budget, 0 if done is None else len(done), unit="trial")
     for trials in search.trials(spec, measure, done):
-        artifacts.write_table(kept, trials, artifacts.TRIALS, sealed=False)
+        artifacts.write_table(kept, trials, schemas.TRIALS, sealed=False)
         for line in meter.lines(len(trials)):
             say(f"{line}, best return {trials['mean_return'].max():.3f}")
-    found = artifacts.read_table(kept, artifacts.TRIALS).head(spec.trials)  # kept: more trials later go on from these
-    artifacts.write_table(snakemake.output[0], found, artifacts.TRIALS)
+    found = artifacts.read_table(kept, schemas.TRIALS).head(spec.trials)  # kept: more trials later go on from these
+    artifacts.write_table(snakemake.output[0], found, schemas.TRIALS)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping import artifacts, jobs
+from reacher_shaping import artifacts, jobs, schemas
 from reacher_shaping.cell import Cell
 from reacher_shaping.provenance import Record, reached_files
 
@@ -24,7 +24,7 @@ with logged(snakemake.log[0]) as say:
     ) as (state, _):
         weights = state.policy(cell).weights()
         artifacts.write_policy(output.policy, params.seeds, weights, settings)
-        artifacts.write_table(output.progress, state.progress_frame(), artifacts.PROGRESS)
+        artifacts.write_table(output.progress, state.progress_frame(), schemas.PROGRESS)
         artifacts.write_monitors(output.monitor, state.episodes_frame())
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
         steps = state.iteration * cell.protocol.ppo.rollout_steps * len(params.seeds)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping import artifacts, peers
+from reacher_shaping import artifacts, peers, schemas
 from reacher_shaping.cell import Protocol
 from reacher_shaping.config import Evaluation
 from reacher_shaping.provenance import Record, reached_files
@@ -23,7 +23,7 @@ with logged(snakemake.log[0]) as say:
         params.root_seed,
         say,
     )
-    artifacts.write_table(output.run, run, artifacts.PEERS)
+    artifacts.write_table(output.run, run, schemas.PEERS)
     path = Path(output.run)
     told = record.to_dict(path.parent, reached_files(__file__), [path], params.budget, snakemake.threads)
     settings = {"protocol": json.loads(params.protocol), "evaluation": json.loads(params.evaluation)}
