@@ -110,7 +110,7 @@ def test_section_lists_our_logs_and_then_the_published_one(section):
     assert rows[0][:4] == ["released", "none", "500K, α₀ = 1", "31 [30, 32]"]
     assert rows[0][4:] == ["-41.0 [-42.0, -40.0]", "-90.0 [-90.0, -90.0]", "0.45 [0.45, 0.45]"]
     assert rows[-1] == ["published, none_seed0", "none", "500K", "33", "-38.6", "-87.2", "0.40 and 0.54"]
-    assert len(rows) == 7 + 1
+    assert len(rows) == 8 + 1
 
 
 def test_section_of_switches_names_the_largest_effect_and_the_interactions(released, effects):
@@ -140,10 +140,10 @@ def test_section_counts_the_differences_that_survive_holm(released):
     shaped["p_holm"] = np.where(shaped["metric"] == "final_distance", 0.01, 0.5)
     shaped.loc[shaped["metric"] == "final_distance", "difference"] = -0.01
     few = experiment_report.shaping_sentence(shaped)
-    assert few == "With 3 seeds no difference between 2 shaped cells and none can be told from chance."
+    assert few == "With 3 seeds no difference between 3 shaped cells and none can be told from chance."
     text = experiment_report.shaping_sentence(shaped.assign(seeds=10))
-    assert "distance at the last step (mm) in 4 of 4 (4 for the better)" in text
-    assert "success, any step in 0 of 4," in text
+    assert "distance at the last step (mm) in 5 of 5 (5 for the better)" in text
+    assert "success, any step in 0 of 5," in text
 
 
 def test_section_names_what_the_only_shaped_cell_changes(released):

@@ -225,7 +225,7 @@ def effects_sentence(effects: pd.DataFrame) -> str:
 
 
 def correlation_grid(correlation: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:
-    """A row per pair of the paper: published, over our cells without and with the labelled baseline, single seeds.
+    """A row per pair of the paper: published, over the same cells and over all of the study, single seeds.
 
     The last column is the main study's, whose start weights are what they say.
     """
@@ -240,7 +240,7 @@ def correlation_grid(correlation: pd.DataFrame, main: pd.DataFrame | None = None
             for level in ("published", "cells", "cells_all")
         ]
         rows.append([name, *texts, span, _main_correlation(main, x, y)])
-    headings = ["", "Published", "Over these cells", "with the run left out of the tables", "One seed a cell, range"]
+    headings = ["", "Published", "Over the same cells", "over all of them", "One seed a cell, range"]
     return Grid([*headings, "The text's protocol, true α₀"], rows)
 
 

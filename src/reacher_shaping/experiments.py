@@ -140,12 +140,12 @@ def logs_frame(progress: pd.DataFrame) -> pd.DataFrame:
 def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str, root_seed: int) -> pd.DataFrame:
     """Correlations over all cells of an experiment, whatever their protocol, in the form of `correlation.csv`.
 
-    Levels: `cells` and `runs` without a baseline that is labelled with another alpha0 than 1, as the paper's table;
-    `cells_all` with it; `seed0`, `seed1`, ...: what a study of that one seed would have reported; and `published`, the
-    paper's main table (`published` comes from `tables.published_cells`).
+    Levels: `cells` and `runs` are the paper's main table, so without the appendix's variants and a baseline labelled
+    with another alpha0 than 1; `cells_all` has them too; `seed0`, `seed1`, ...: what a study of that one seed would have
+    reported; and `published`, the paper's own table (`published` comes from `tables.published_cells`).
     """
     labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
-    kept, theirs = runs[~labelled], published[in_table_2(published)]
+    kept, theirs = runs[in_table_2(runs) & ~labelled], published[in_table_2(published)]
     levels = {"cells": _means(kept), "runs": kept, "cells_all": _means(runs), "published": theirs}
     parts = [correlations(rows, level, generator(root_seed, name, level)) for level, rows in levels.items()]
     for seed, rows in kept.groupby("seed"):
