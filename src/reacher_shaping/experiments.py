@@ -141,7 +141,7 @@ def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str, ro
     """Correlations over all cells of an experiment, whatever their protocol, in the form of `correlation.csv`.
 
     Levels: `cells` and `runs` are the paper's main table, so without the appendix's variants and a baseline labelled
-    with another alpha0 than 1; `cells_all` has them too; `seed0`, `seed1`, ...: what a study of that one seed would have
+    with another alpha0 than 1; `cells_all` has them too; `seed0`, `seed1`, ...: what a study of that seed would have
     reported; and `published`, the paper's own table (`published` comes from `tables.published_cells`).
     """
     labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
