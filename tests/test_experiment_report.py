@@ -43,10 +43,12 @@ def section(released):
 
 def test_effects_figure_has_each_difference_with_its_interval(effects):
     figure = experiment_figures.effects(effects)
+    for axes, metric in zip(figure.axes, experiment_figures.EFFECT_LABELS, strict=True):
+        drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_label() == "_effect")
+        shown = effects[(effects["metric"] == metric) & (effects["effect"] != "interaction")]
+        assert drawn == pytest.approx(sorted(shown["difference"]))
     axes = figure.axes[0]
-    drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_label() == "_effect")
     shown = effects[(effects["metric"] == "success_rate") & (effects["effect"] != "interaction")]
-    assert drawn == pytest.approx(sorted(shown["difference"]))
     filled = [line for line in axes.lines if line.get_label() == "_effect" and line.get_markerfacecolor() != "white"]
     assert len(filled) == ((shown["ci_low"] > 0) | (shown["ci_high"] < 0)).sum() > 0
     assert [label.get_text() for label in axes.get_yticklabels()] == [
@@ -78,6 +80,7 @@ def test_log_figure_sets_the_published_peak_and_end_beside_the_curve_of_the_same
         pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": -50.0, "budget": budget, **key})
         for budget in (500_000, 1_000_000)
     ]
+    parts.append(parts[0].assign(alpha0=0.5))  # a label of other runs than the published log's
     figure = experiment_figures.log(pd.concat(parts), LOGS)
     marks = [line for axes in figure.axes for line in axes.lines if line.get_label() == "_published"]
     assert [list(line.get_xdata()) for line in marks] == [[33, 245]]
@@ -89,8 +92,11 @@ def test_correlation_figure_has_a_panel_each_for_the_published_and_ours(released
     figure = experiment_figures.correlation(released["correlation"])
     titles = [axes.get_title(loc="left") for axes in figure.axes[:2]]
     assert titles == ["Published Table 2", "Released code, labels as published"]
-    texts = [text.get_text() for text in figure.axes[0].texts]
-    assert any(text.startswith("0.91") for text in texts)
+    table = released["correlation"]
+    for axes, level in zip(figure.axes[:2], ("published", "cells"), strict=True):
+        chosen = table[(table["level"] == level) & (table["method"] == "pearson")]
+        own = chosen[(chosen["x"] == "alpha0") & (chosen["y"] == "mean_return")]["r"].iloc[0]
+        assert any(text.get_text().startswith(f"{own:.2f}") for text in axes.texts), level
 
 
 def test_section_tells_the_correlation_beside_the_published_one(section):
@@ -126,6 +132,28 @@ def test_section_of_switches_names_the_largest_effect_and_the_interactions(relea
     assert "depends on the others beyond chance for a (success" in text
 
 
+def test_the_largest_effect_may_be_a_loss(effects):
+    first = (effects["effect"] == "alone") & (effects["switch"] == "b") & (effects["metric"] == "success_rate")
+    moved = effects.assign(difference=np.where(first, -0.7, effects["difference"]))
+    assert "success, any step: b: discount 0.99 to 0.5 (none, alone" in experiment_report.effects_sentence(moved)
+
+
+def test_best_cell_is_the_one_with_the_highest_success(released):
+    cells = released["cells"].assign(success_rate=0.1)
+    cells.loc[(cells["variant"] == "l2sq"), "success_rate"] = 0.9
+    text = experiment_report.best_sentence(cells)
+    assert text.startswith("The cell with the highest success rate is released late, L2² (500K, α₀ = 0.5): success")
+    assert "any step 0.900" in text
+
+
+def test_one_seed_a_cell_ranges_over_the_studies_of_one_seed(section, released):
+    own = released["correlation"]
+    own = own[(own["method"] == "pearson") & (own["x"] == "alpha0") & (own["y"] == "mean_return")]
+    seeds = own[own["level"].isin(["seed0", "seed1", "seed2"])]["r"]
+    row = section.grids[next(name for name in section.grids if name.startswith("Pearson"))].rows[0]
+    assert row[4] == f"{seeds.min():.2f} to {seeds.max():.2f}"
+
+
 def test_section_says_whether_a_peer_differs(released):
     ours = synthetic.runs([("standard", "none", 500_000, 1.0)], 8)
     same = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers()))
@@ -133,6 +161,8 @@ def test_section_says_whether_a_peer_differs(released):
     apart = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers(0.5)))
     assert apart.startswith("1 of 8 measures differ")
     assert apart.endswith("success, any step.")
+    uncorrected = experiments.agreement_frame(ours, peers()).assign(p=1e-9)
+    assert experiment_report.agreement_sentence(uncorrected) == same
 
 
 def test_section_counts_the_differences_that_survive_holm(released):
@@ -141,6 +171,7 @@ def test_section_counts_the_differences_that_survive_holm(released):
     shaped.loc[shaped["metric"] == "final_distance", "difference"] = -0.01
     few = experiment_report.shaping_sentence(shaped)
     assert few == "With 3 seeds no difference between 3 shaped cells and none can be told from chance."
+    assert experiment_report.shaping_sentence(shaped.assign(seeds=6)) == few.replace("3 seeds", "6 seeds")  # 3 / 2^5
     text = experiment_report.shaping_sentence(shaped.assign(seeds=10))
     assert "distance at the last step (mm) in 5 of 5 (5 for the better)" in text
     assert "success, any step in 0 of 5," in text

@@ -7,7 +7,7 @@ import synthetic
 from scipy import stats as scipy_stats
 
 from reacher_shaping import experiments
-from reacher_shaping.cell import Protocol
+from reacher_shaping.cell import Environment, Protocol
 from reacher_shaping.config import Switches
 
 SWITCHES = Switches(
@@ -80,6 +80,21 @@ def test_returns_are_compared_at_one_control_weight():
     np.testing.assert_allclose(late, -10 - (2 + np.arange(6)))
 
 
+def test_a_protocol_that_charges_nothing_has_no_return_at_another_weight():
+    table = runs({"paper": 0.3}).assign(reward_control=0.0)
+    free = PROTOCOLS["paper"].model_copy(update={"environment": Environment(control_weight=0.0)})
+    assert experiments.unit_return(table, {"paper": free}).isna().all()
+    free_and_scaled = experiments.unit_return(table.assign(reward_control=-1.0), {"paper": free})
+    assert free_and_scaled.isna().all(), "not minus infinity"
+
+
+def test_the_baseline_has_its_own_weight_in_an_experiment_of_another():
+    switches = SWITCHES.model_copy(update={"variants": ("none", "l2"), "alpha0": 3.0})
+    shaped = runs(MEANS, variant="l2").assign(alpha0=3.0)
+    frame = experiments.effects_frame(pd.concat([runs(MEANS), shaped]), switches, PROTOCOLS, 0)
+    assert set(frame["variant"]) == {"none", "l2"}
+
+
 def test_effect_without_its_cells_is_left_out():
     rest = {name: mean for name, mean in MEANS.items() if name != "paper_with_a"}
     frame = experiments.effects_frame(runs(rest), SWITCHES, PROTOCOLS, 0)
@@ -108,7 +123,14 @@ def test_logs_tell_peak_and_end_of_the_logged_return():
     peaked = np.where(iteration <= 30, -100 + 2.0 * iteration, -40.0 - (iteration - 30))
     key = {"protocol": "released", "variant": "none", "budget": 204_800, "alpha0": 1.0}
     progress = pd.DataFrame(
-        {"seed": 3, "iteration": iteration, "logged_return": peaked, "episode_return": 0.0, "action_std": 0.5, **key}
+        {
+            "seed": 3,
+            "iteration": iteration,
+            "logged_return": peaked,
+            "episode_return": 0.0,
+            "action_std": 0.5 - 0.01 * (iteration - iteration.max()),
+            **key,
+        }
     ).sample(frac=1, random_state=1)
     row = experiments.logs_frame(progress).iloc[0]
     means = np.convolve(peaked, np.ones(20) / 20, mode="valid")
@@ -141,6 +163,7 @@ def test_labels_correlate_over_the_cells_of_the_main_table():
     assert (r("cells")["r"], r("cells")["n"]) == (pytest.approx(expected), 6)
     assert r("cells_all")["n"] == 8
     one = kept[kept["seed"] == 1]
+    assert r("seed1")["n"] == 6
     assert r("seed1")["r"] == pytest.approx(np.corrcoef(one["alpha0"], one["mean_return"])[0, 1])
     assert r("published")["r"] == pytest.approx(0.910, abs=5e-4)
     assert r("published", "success_rate")["r"] == pytest.approx(0.369, abs=5e-4)

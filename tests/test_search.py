@@ -3,11 +3,12 @@
 import math
 from pathlib import Path
 
+import optuna
 import pandas as pd
 import pytest
 
 from reacher_shaping import search
-from reacher_shaping.cell import PPO, ConfigError, Protocol, Variant
+from reacher_shaping.cell import PPO, ConfigError, Environment, Protocol, Variant
 from reacher_shaping.config import Search, load_study
 
 ROOT = Path(__file__).parents[1]
@@ -66,16 +67,21 @@ def test_more_trials_begin_with_the_fewer(table):
     pd.testing.assert_frame_equal(fewer, table.head(12))
 
 
-def test_diverged_trial_counts_as_the_worst_and_does_not_stop_the_search():
+def test_diverged_trial_counts_as_the_worst_and_does_not_stop_the_search(monkeypatch):
     measured = []
 
     def measure(values):
         measured.append(values)
         return {"mean_return": float("nan") if len(measured) in (1, 4) else score(values)["mean_return"]}
 
+    told = []
+    create = optuna.trial.create_trial
+    monkeypatch.setattr(optuna.trial, "create_trial", lambda **given: told.append(given["value"]) or create(**given))
     table = finished(SPEC.model_copy(update={"trials": 12}), measure)
     assert table["mean_return"].isna().sum() == 2
     assert len(table) == 12
+    finite = table["mean_return"].head(11).fillna(table["mean_return"].head(11).min())
+    assert told[-11:] == finite.tolist()
 
 
 def test_a_trial_trains_the_protocol_with_its_own_settings_under_its_own_root():
@@ -92,7 +98,25 @@ def test_impossible_trial_is_one_line():
     assert "\n" not in str(caught.value)
 
 
-def test_score_is_the_mean_over_seeds_of_real_runs():
+def test_score_is_the_mean_over_what_the_evaluation_found(monkeypatch):
+    asked = {}
+
+    def evaluate(act, seeds, **given):
+        asked.update(given, seeds=seeds)
+        columns = search.MEASURES.values()
+        return pd.DataFrame({name: [1.0 * place, 3.0 * place] for place, name in enumerate(columns)})
+
+    monkeypatch.setattr(search, "evaluate", evaluate)
+    settings = PPO(rollout_steps=192, epochs=1, minibatch_size=32)
+    protocol = Protocol(name="standard", ppo=settings, environment=Environment(control_weight=0.5, clip_actions=True))
+    cell = SPEC.cell(protocol, L2, {}).model_copy(update={"budget": 192})
+    found = search.score(cell, 3, episodes=7, radius=0.03)
+    assert found == {name: 2.0 * place for place, name in enumerate(search.MEASURES)}
+    expected = {"mode": "stochastic", "clip_actions": True, "control_weight": 0.5, "episodes": 7, "radius": 0.03}
+    assert asked == expected | {"seeds": [0, 1, 2], "root_seed": 5}
+
+
+def test_score_is_that_of_real_runs():
     settings = PPO(rollout_steps=192, epochs=1, minibatch_size=32)
     cell = SPEC.cell(Protocol(name="standard", ppo=settings), L2, {}).model_copy(update={"budget": 384})
     found = search.score(cell, 2, episodes=50, radius=0.05)

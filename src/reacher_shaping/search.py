@@ -91,7 +91,7 @@ def trials(
 
 
 def _plain(value: Any, distribution: optuna.distributions.BaseDistribution) -> Any:
-    """A number of a table as the distribution has it: an integer of a column that a missing value made float."""
+    """A table's number as the distribution has it: a choice must be of the choice's own type."""
     if isinstance(distribution, optuna.distributions.CategoricalDistribution):
         return next(choice for choice in distribution.choices if choice == value)
-    return int(value) if isinstance(distribution, optuna.distributions.IntDistribution) else float(value)
+    return float(value)
