@@ -287,3 +287,10 @@ def test_records_keep_every_field():
     assert torch.equal(samples.action, fields[1].transpose(1, 2))
     for ours, given_ in zip((samples.features, *samples[2:]), (fields[0], *fields[2:]), strict=True):
         np.testing.assert_array_equal(ours, given_)
+
+
+def test_minibatches_are_normalised_as_stable_baselines3_does():
+    advantage = torch.tensor([[1.0, 2.0, 3.0], [5.0, -1.0, 8.0]])
+    # stable_baselines3/ppo/ppo.py: (advantages - advantages.mean()) / (advantages.std() + 1e-8), with torch's std
+    expected = torch.tensor([[-1.0, 0.0, 1.0], [1 / math.sqrt(21), -5 / math.sqrt(21), 4 / math.sqrt(21)]])
+    torch.testing.assert_close(ppo._normalise(advantage), expected)
