@@ -58,8 +58,22 @@ def test_search_finds_better_settings_than_its_random_start(table):
 
 def test_interrupted_search_ends_like_another(table, tmp_path):
     path = tmp_path / "trials.csv"
-    table.head(13).astype({"ppo.epochs": float}).to_csv(path, index=False)
-    pd.testing.assert_frame_equal(finished(done=pd.read_csv(path)), table, check_dtype=False)
+    table.head(13).astype({"ppo.epochs": float, "ppo.minibatch_size": float}).to_csv(path, index=False)
+    measured = []
+
+    def measure(values):
+        measured.append(values)
+        return score(values)
+
+    ended = finished(done=pd.read_csv(path), measure=measure)
+    pd.testing.assert_frame_equal(ended, table, check_dtype=False)
+    assert len(measured) == 25 - 13, "no trial is done twice"
+
+
+def test_a_space_may_be_logarithmic():
+    found = search.distributions(SPEC)
+    assert found["ppo.learning_rate"].log
+    assert not found["alpha0"].log
 
 
 def test_more_trials_begin_with_the_fewer(table):
