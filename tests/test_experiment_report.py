@@ -7,7 +7,7 @@ import synthetic
 from test_experiments import MEANS, PROTOCOLS, SWITCHES, labelled_runs, peers
 from test_experiments import runs as switched_runs
 
-from reacher_shaping import comparisons, experiment_figures, experiment_report, experiments
+from reacher_shaping import comparisons, experiment_figures, experiment_report, experiment_tables, experiments
 from reacher_shaping.style import to_bytes
 
 LOGS = pd.DataFrame(
@@ -150,7 +150,7 @@ def test_one_seed_a_cell_ranges_over_the_studies_of_one_seed(section, released):
     own = released["correlation"][released["correlation"]["method"] == "pearson"]
     own = own[own["level"].isin(["seed0", "seed1", "seed2"])].groupby(["x", "y"])["r"].agg(["min", "max"])
     rows = section.grids[next(name for name in section.grids if name.startswith("Pearson"))].rows
-    for row, pair in zip(rows, experiment_report.PAIRS, strict=True):
+    for row, pair in zip(rows, experiment_tables.PAIRS, strict=True):
         span = row[4].replace("\N{MINUS SIGN}", "-")
         assert span == "{min:.2f} to {max:.2f}".format(**own.loc[pair])
 
@@ -158,7 +158,10 @@ def test_one_seed_a_cell_ranges_over_the_studies_of_one_seed(section, released):
 def test_section_says_whether_a_peer_differs(released):
     ours = synthetic.runs([("standard", "none", 500_000, 1.0)], 8)
     same = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers()))
-    assert same == "None of 8 measures differs from Stable-Baselines3's beyond chance (8 seeds beside 5)."
+    assert same.startswith("None of 8 measures differs from Stable-Baselines3's beyond chance (8 seeds beside 5); the")
+    frame = experiments.agreement_frame(ours, peers())
+    low, high = (f"{frame[name].iloc[0]:.3f}".replace("-", "\N{MINUS SIGN}") for name in ("ci_low", "ci_high"))
+    assert same.endswith(f" [{low}, {high}].")
     apart = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers(0.5)))
     assert apart.startswith("1 of 8 measures differ")
     assert apart.endswith("success, any step.")
