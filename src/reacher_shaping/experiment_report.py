@@ -186,10 +186,10 @@ def agreement_sentence(agreement: pd.DataFrame) -> str:
     seeds = f"{agreement['our_seeds'].max():.0f} seeds beside {agreement['their_seeds'].max():.0f}"
     if apart.empty:
         first = agreement.iloc[0].to_dict()
-        digits, factor = decimals(first["metric"])
+        difference = interval(first, "difference", "ci_low", "ci_high", *decimals(first["metric"]))
         return (
-            f"None of {len(agreement)} measures differs from Stable-Baselines3's beyond chance ({seeds}); the difference "
-            f"in {within(NAMES[first['metric']])} is {interval(first, 'difference', 'ci_low', 'ci_high', digits, factor)}."
+            f"None of {len(agreement)} measures differs from Stable-Baselines3's beyond chance ({seeds}); "
+            f"the difference in {within(NAMES[first['metric']])} is {difference}."
         )
     names = ", ".join(within(NAMES[name]) for name in apart["metric"])
     return (
