@@ -88,7 +88,7 @@ def cells(runs: pd.DataFrame, table: pd.DataFrame, controllers: pd.DataFrame | N
             if metric in ceiling:
                 look = {"color": "#555555", "linestyle": ":", "linewidth": 1.2, "label": "_controller"}
                 axes.plot([ceiling[metric]] * 2, [y - 0.5, y + 0.5], **look)
-            if order.index(row["protocol"]) % 2 == 0:
+            if len(order) > 1 and order.index(row["protocol"]) % 2 == 0:
                 axes.axhspan(y - 0.5, y + 0.5, color="#F3F5F7", linewidth=0, zorder=0)
         if metric.endswith("rate"):
             axes.xaxis.set_major_formatter(PercentFormatter(xmax=1, decimals=0, symbol=" %"))

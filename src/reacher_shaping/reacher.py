@@ -86,10 +86,11 @@ class Fields:
 
     MuJoCo allocates every simulation by itself, so their fields lie scattered in this process's memory, always at the
     same addresses. One array that spans them all, indexed by these addresses, saves touching each of them from Python.
+    What lies between the fields is not ours and never touched.
     """
 
     def __init__(self, views: Sequence[Sequence[NDArray[np.float64]]]) -> None:
-        """Bind one row of views per simulation; all rows hold as many numbers."""
+        """Bind one row of contiguous views per simulation; all rows hold as many numbers."""
         self._views = views  # keeps the simulations alive
         addresses = np.array([np.concatenate([_addresses(view) for view in row]) for row in views])
         first = min((view for row in views for view in row), key=lambda view: view.ctypes.data)
