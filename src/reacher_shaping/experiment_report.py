@@ -29,9 +29,10 @@ INTROS = {
     "control cost (D1), an axis too many that pairs every new probability of a minibatch with every old one (D2), a "
     "recursion whose carry is not stored, so that advantages look one step ahead (D3), a learning rate that changes "
     "with a late commit (D4), a log of the shaped return over the last ten episodes (D5), the potential under a decay "
-    "(D6), and a start weight α₀ that is a label: every run starts at 1 (D7). Here the cells of Table 2 are trained as "
+    "(D6), and a start weight α₀ that is a label: every run starts at 1 (D7). Here the published runs are trained as "
     "that code trains them, labels as published; the runs labelled 0.5 have the late commit's learning rate and, where "
-    "their weight decays, its potential L2².",
+    "their weight decays, its potential L2². So the appendix's runs of 500K are, under this reading, those of the main "
+    "table labelled 0.5, number for number.",
     "attribution": "Both ends and, between them, every switch alone from the text, and taken back alone from the "
     "release. If switches acted independently, the two would agree.",
     "standard": "The same variants under settings that are usual for PPO on this task: a network each for policy and "
