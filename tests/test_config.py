@@ -138,7 +138,7 @@ def test_a_label_may_be_given_to_the_baseline():
     """The released run called `none` 0.5: alpha0 is a label there, and needs no meaning."""
     folders = [cell.folder for cell in load_study(DEFAULT).experiment_cells["released"]]
     assert "released_late/none/500000/alpha0.5" in folders
-    assert len(folders) == 24
+    assert len(folders) == 21
 
 
 @pytest.mark.parametrize(

@@ -165,6 +165,9 @@ def test_section_says_whether_a_peer_differs(released):
     apart = experiment_report.agreement_sentence(experiments.agreement_frame(ours, peers(0.5)))
     assert apart.startswith("1 of 8 measures differ")
     assert apart.endswith("success, any step.")
+    assert "to its PPO in success, any step is" in same
+    alone = experiments.agreement_frame(ours, peers(seeds=1))
+    assert experiment_report.agreement_sentence(alone).endswith("cannot be told (8 seeds beside 1).")
     uncorrected = experiments.agreement_frame(ours, peers()).assign(p=1e-9)
     assert experiment_report.agreement_sentence(uncorrected) == same
 
@@ -181,14 +184,30 @@ def test_section_counts_the_differences_that_survive_holm(released):
     assert "success, any step in 0 of 5," in text
 
 
-def test_section_names_what_the_only_shaped_cell_changes(released):
+def test_section_corrects_over_the_measures_of_the_only_shaped_cell(released):
     shaped = released["comparisons"]
-    shaped = shaped[shaped["family"] == "none"].groupby("metric").head(1).assign(seeds=10, p_holm=0.5, difference=-0.01)
+    shaped = shaped[shaped["family"] == "none"].groupby("metric").head(1)
+    shaped = shaped.assign(seeds=10, p=0.5, p_holm=0.001, difference=-0.01, ci_low=-0.02, ci_high=0.01)
     nothing = experiment_report.shaping_sentence(shaped)
-    assert nothing == "Beyond chance (Holm, 5 %) shaping changes nothing."
-    shaped.loc[shaped["metric"].isin(["final_distance", "mean_return"]), "p_holm"] = 0.01
-    text = experiment_report.shaping_sentence(shaped)
-    assert "mean return (for the worse); distance at the last step (mm) (for the better). It does not: success" in text
+    assert "(Holm over the measures, 5 %): nothing. Not to be told from chance: success, any step" in nothing
+    shaped.loc[shaped["metric"] == "final_distance", "p"] = 0.009  # 5 times as much once corrected: below 5 %
+    shaped.loc[shaped["metric"] == "mean_return", "p"] = 0.015  # 4 times as much: above
+    changed, chance = experiment_report.shaping_sentence(shaped).split("Not to be told from chance")
+    minus = "\N{MINUS SIGN}"
+    assert f"5 %): distance at the last step (mm) {minus}10.0 [{minus}20.0, 10.0], p 0.045." in changed
+    assert f"mean return {minus}0.01 [{minus}0.02, 0.01], p 0.060" in chance
+    assert "success" not in changed
+    few = experiment_report.shaping_sentence(shaped.assign(seeds=7))  # 5 / 2^6
+    assert few == "With 7 seeds no difference between the shaped cell and none can be told from chance."
+
+
+def test_two_protocols_of_one_shaped_cell_are_no_only_cell(released):
+    shaped = released["comparisons"]
+    shaped = shaped[shaped["family"] == "none"].groupby(["protocol", "metric"]).head(1)
+    assert shaped["protocol"].nunique() == 2
+    losses = np.where(shaped["protocol"] == "released", 0.1, -0.1)
+    text = experiment_report.shaping_sentence(shaped.assign(seeds=10, p_holm=0.01, difference=losses))
+    assert "success, any step in 2 of 2 (1 for the better)" in text
 
 
 def test_document_holds_every_table_and_figure(released):

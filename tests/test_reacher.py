@@ -133,6 +133,18 @@ def test_fields_are_those_of_each_simulation():
         np.testing.assert_array_equal(data.ctrl, 0.5 - number)
 
 
+@pytest.mark.parametrize("view", [np.zeros((2, 2)), np.zeros(4)[::2], np.zeros(3, dtype=np.float32)])
+def test_fields_refuse_what_they_cannot_address(view):
+    with pytest.raises(ValueError, match="no whole vector of float64"):
+        Fields([[np.zeros(2), view]])
+
+
+def test_fields_refuse_views_out_of_step():
+    memory = np.zeros(40, dtype=np.uint8)
+    with pytest.raises(ValueError, match="not aligned"):
+        Fields([[memory[:16].view(np.float64)], [memory[20:36].view(np.float64)]])
+
+
 def test_a_reset_leaves_nothing_of_the_episode_before():
     rng = np.random.default_rng(12)
     used, fresh = Lanes(2), Lanes(2)

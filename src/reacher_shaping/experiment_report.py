@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from reacher_shaping import experiment_figures, experiment_tables, grids, views
+from reacher_shaping import experiment_figures, experiment_tables, grids, stats, views
 from reacher_shaping.experiment_figures import KINDS, protocol_label, switch_label
-from reacher_shaping.experiment_tables import METRICS, NAMES, SHAPING, decimals, interval
+from reacher_shaping.experiment_tables import METRICS, NAMES, SHAPING, decimals, interval, p_value
 from reacher_shaping.grids import Grid
 from reacher_shaping.learning import WINDOW
 from reacher_shaping.style import setting_label, to_bytes, variant_label
@@ -31,8 +31,8 @@ INTROS = {
     "with a late commit (D4), a log of the shaped return over the last ten episodes (D5), the potential under a decay "
     "(D6), and a start weight α₀ that is a label: every run starts at 1 (D7). Here the published runs are trained as "
     "that code trains them, labels as published; the runs labelled 0.5 have the late commit's learning rate and, where "
-    "their weight decays, its potential L2². So the appendix's runs of 500K are, under this reading, those of the main "
-    "table labelled 0.5, number for number.",
+    "their weight decays, its potential L2². So the appendix's runs of 500K would be those of the main table labelled "
+    "0.5, number for number, and are not trained twice.",
     "attribution": "Both ends and, between them, every switch alone from the text, and taken back alone from the "
     "release. If switches acted independently, the two would agree.",
     "standard": "The same variants under settings that are usual for PPO on this task: a network each for policy and "
@@ -183,47 +183,55 @@ def correlation_sentence(correlation: pd.DataFrame) -> str:
 
 def agreement_sentence(agreement: pd.DataFrame) -> str:
     """Whether the two implementations differ beyond chance."""
-    apart = agreement[agreement["p_holm"] < LEVEL]
+    tested = agreement.dropna(subset="p_holm")
     seeds = f"{agreement['our_seeds'].max():.0f} seeds beside {agreement['their_seeds'].max():.0f}"
+    if tested.empty:
+        return f"Whether ours differs from Stable-Baselines3's cannot be told ({seeds})."
+    apart = tested[tested["p_holm"] < LEVEL]
     if apart.empty:
-        first = agreement.iloc[0].to_dict()
+        first = tested.iloc[0].to_dict()
         difference = interval(first, "difference", "ci_low", "ci_high", *decimals(first["metric"]))
         return (
-            f"None of {len(agreement)} measures differs from Stable-Baselines3's beyond chance ({seeds}); "
-            f"the difference in {within(NAMES[first['metric']])} is {difference}."
+            f"None of {len(tested)} measures differs from Stable-Baselines3's beyond chance ({seeds}); "
+            f"the difference to its {first['algorithm'].upper()} in {within(NAMES[first['metric']])} is {difference}."
         )
     names = ", ".join(within(NAMES[name]) for name in apart["metric"])
-    return (
-        f"{len(apart)} of {len(agreement)} measures differ from Stable-Baselines3's beyond chance ({seeds}): {names}."
-    )
+    return f"{len(apart)} of {len(tested)} measures differ from Stable-Baselines3's beyond chance ({seeds}): {names}."
 
 
 def shaping_sentence(shaped: pd.DataFrame) -> str:
     """In how many comparisons a shaped cell differs from `none` beyond chance, measure by measure."""
-    family = shaped.groupby(["protocol", "metric"]).size().max()
+    measured = shaped[shaped["metric"].isin(SHAPING)]
+    family = measured.groupby(["protocol", "metric"]).size().max()
     seeds = int(shaped["seeds"].max())
-    if 2.0 ** (1 - seeds) * family > LEVEL:  # the smallest p of a sign-flip test, corrected
-        return f"With {seeds} seeds no difference between {family} shaped cells and none can be told from chance."
-    tested = {metric: shaped[shaped["metric"] == metric].dropna(subset="p_holm") for metric in SHAPING}
-    apart = {metric: own[own["p_holm"] < LEVEL] for metric, own in tested.items()}
-    better = {metric: _better(metric, own["difference"]) for metric, own in apart.items()}
-    if family == 1:
-        changed = [
-            f"{within(NAMES[metric])} (for the {'better' if better[metric] else 'worse'})"
-            for metric, own in apart.items()
-            if len(own)
-        ]
-        same = [within(NAMES[metric]) for metric, own in apart.items() if own.empty]
-        text = f"Beyond chance (Holm, 5 %) shaping changes {'; '.join(changed) or 'nothing'}"
-        return f"{text}. It does not: {'; '.join(same)}." if changed and same else f"{text}."
-    parts = [
-        f"{within(NAMES[metric])} in {len(own)} of {len(tested[metric])}"
-        + (f" ({better[metric]} for the better)" if len(own) else "")
-        for metric, own in apart.items()
-    ]
+    only = len(measured) == measured["metric"].nunique()
+    if (
+        2.0 ** (1 - seeds) * (len(measured) if only else family) > LEVEL
+    ):  # the smallest p of a sign-flip test, corrected
+        cells = "the shaped cell" if only else f"{family} shaped cells"
+        return f"With {seeds} seeds no difference between {cells} and none can be told from chance."
+    if only:
+        return _only_cell_sentence(measured)
+    parts = []
+    for metric in SHAPING:
+        own = measured[measured["metric"] == metric].dropna(subset="p_holm")
+        apart = own[own["p_holm"] < LEVEL]
+        better = (apart["difference"] < 0).sum() if metric.endswith("distance") else (apart["difference"] > 0).sum()
+        parts.append(
+            f"{within(NAMES[metric])} in {len(apart)} of {len(own)}"
+            + (f" ({better} for the better)" if len(apart) else "")
+        )
     return f"Shaped cells that differ from none beyond chance (Holm, 5 %): {', '.join(parts)}."
 
 
-def _better(metric: str, differences: "pd.Series[float]") -> int:
-    """How many differences to the baseline are improvements."""
-    return int(((differences < 0) if metric.endswith("distance") else (differences > 0)).sum())
+def _only_cell_sentence(measured: pd.DataFrame) -> str:
+    """What the only shaped cell of a study changes: its family is that of its measures."""
+    rows = measured.assign(p_holm=stats.holm(measured["p"].to_numpy())).set_index("metric").loc[list(SHAPING)]
+    changed: list[str] = []
+    chance: list[str] = []
+    for row in rows.reset_index().to_dict("records"):
+        difference = interval(row, "difference", "ci_low", "ci_high", *decimals(row["metric"]))
+        text = f"{within(NAMES[row['metric']])} {difference}, p {p_value(row['p_holm'])}"
+        (changed if row["p_holm"] < LEVEL else chance).append(text)
+    told = f"What shaping adds beyond chance (Holm over the measures, 5 %): {'; '.join(changed) or 'nothing'}."
+    return f"{told} Not to be told from chance: {'; '.join(chance)}." if chance else told

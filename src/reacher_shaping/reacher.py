@@ -90,11 +90,16 @@ class Fields:
     """
 
     def __init__(self, views: Sequence[Sequence[NDArray[np.float64]]]) -> None:
-        """Bind one row of contiguous views per simulation; all rows hold as many numbers."""
+        """Bind one row of views per simulation; all rows hold as many numbers.
+
+        Raises ValueError for a view that is not a vector of float64, whole in memory: nothing else can be addressed so.
+        """
         self._views = views  # keeps the simulations alive
         addresses = np.array([np.concatenate([_addresses(view) for view in row]) for row in views])
         first = min((view for row in views for view in row), key=lambda view: view.ctypes.data)
-        self._index = (addresses - first.ctypes.data) // first.itemsize
+        self._index, rest = np.divmod(addresses - first.ctypes.data, first.itemsize)
+        if rest.any():
+            raise ValueError("the views are not aligned to each other")
         self._memory = as_strided(first, shape=(int(self._index.max()) + 1,))
 
     def read(self) -> Array:
@@ -110,6 +115,8 @@ class Fields:
 
 
 def _addresses(view: NDArray[np.float64]) -> NDArray[np.int64]:
+    if view.ndim != 1 or view.dtype != np.float64 or not view.flags.c_contiguous:
+        raise ValueError(f"no whole vector of float64: shape {view.shape}, {view.dtype}, strides {view.strides}")
     return view.ctypes.data + np.arange(len(view)) * view.itemsize
 
 
@@ -143,14 +150,15 @@ class Lanes:
     def reset(self, draws: Sequence[tuple[Array, Array]]) -> None:
         """Start an episode in every lane from (positions [4], velocities [4]), one pair a lane.
 
-        All else that enters the next step is zero, as after `mj_resetData`, which clears much more. Raises ValueError
-        if the number of pairs is not the number of lanes.
+        The solver's last accelerations and the torques are cleared with it, as `mj_resetData` does; all else that it
+        clears is computed anew or never set here, but for the time, which runs on and enters nothing. Raises
+        ValueError if the number of pairs is not the number of lanes.
         """
         start = np.reshape(draws, (len(draws), -1))
         self._state.write(np.pad(start, [(0, 0), (0, self.model.nv + self.model.nu)]))
         for data in self.data:
             mujoco.mj_forward(self.model, data)
-        self.observation[:, 4:6], self._target = np.split(self._resting.read(), [2], axis=1)
+        self.observation[:, 4:6], self._target[:] = np.split(self._resting.read(), [2], axis=1)
         self._read()
 
     def step(self, action: NDArray[np.floating]) -> None:

@@ -188,7 +188,10 @@ def _further_facts(record: Mapping[str, Any]) -> str:
     text = ""
     if blocks:
         steps, hours = _spent(list(blocks.values()))
-        text += f" Its further studies took {steps / 1e6:.0f} million steps more, in {hours:.1f} core hours."
+        text += (
+            f" Its further studies took {steps / 1e6:.0f} million steps more, in {hours:.1f} core hours; what several "
+            "share is counted once here."
+        )
     if record.get("peers"):
         text += f" The peers took {_spent(record['peers'])[1]:.1f} core hours."
     return text
@@ -197,7 +200,7 @@ def _further_facts(record: Mapping[str, Any]) -> str:
 def _took(blocks: Sequence[Mapping[str, Any]]) -> str:
     """Say what the blocks of one further study took, those included that another study trained."""
     steps, hours = _spent(blocks)
-    return f"({steps / 1e6:.0f} million steps, {60 * hours:.0f} core minutes of training)"
+    return f"Training: {steps / 1e6:.0f} million steps, {60 * hours:.0f} core minutes."
 
 
 def _spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
