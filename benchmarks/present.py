@@ -17,6 +17,7 @@ BLOCK = 10
 
 TITLES = {
     "training": "Training, paper protocol",
+    "floor": "Training against its floor: its own mj_step calls and matrix products, alone",
     "evaluation": "Evaluation, stochastic",
     "jobs": "A training job in a fresh process",
     "ladder": "What each idea brings",

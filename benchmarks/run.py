@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -28,6 +28,7 @@ sys.path.insert(0, str(HERE.parent / "tests"))  # the plain loop lives there
 
 import peers
 import torch
+from floor import Floor, fraction
 from ladder import RADIUS, engine, rungs
 from present import write
 from side_by_side import Measure, Workload, measure, pin, ratios, take_turns
@@ -55,6 +56,7 @@ class Size:
     budgets: tuple[int, ...] = (1, 2, 4)  # iterations
     chunks: int = 20  # of LANES_PER_SEED episodes: the 1000 of the study
     blocks: tuple[int, ...] = (1, 10, 100)  # per cell, for the dry run
+    floor_begins: tuple[int, ...] = (0, 60)  # iterations before the floor is measured
     job_iterations: int = 3
     quick: bool = False
 
@@ -71,7 +73,7 @@ class Size:
         return Cell.model_validate(cell)
 
 
-QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, blocks=(1,), quick=True)
+QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, blocks=(1,), floor_begins=(0, 3), quick=True)
 
 
 @dataclass
@@ -83,8 +85,11 @@ class Training:
     state: Any = None
     """What the last iteration left."""
 
+    done: int = 0
+
     def __call__(self) -> float:
         self.state = next(self.iterations)
+        self.done += 1
         return self.steps
 
 
@@ -93,61 +98,56 @@ def training(cell: Cell, seeds: int) -> Training:
 
 
 def measure_training(size: Size) -> Iterator[Measure]:
-    """Training against Stable-Baselines3's PPO with the same hyperparameters, and against the floor."""
-    cell, block = size.cell(), size.block
-    floors = {seeds: peers.Floor(cell, seeds) for seeds in (block, 1)}
-    rates: dict[str, list[float]] = {}
-    names = {"engine": block, "engine of one": 1}
-    engines = {seeds: training(cell, seeds) for seeds in names.values()}
-    workloads: dict[str, Workload] = {name: engines[seeds] for name, seeds in names.items()}
+    """Training against Stable-Baselines3's PPO with the same hyperparameters."""
+    cell, part = size.cell(), "training"
+    names = {"engine": size.block, "engine of one": 1}
+    workloads: dict[str, Workload] = {name: training(cell, seeds) for name, seeds in names.items()}
     workloads["peer"] = peers.stable_baselines(cell, shared=False)
     workloads["peer, shared trunk"] = peers.stable_baselines(cell, shared=True)
-    for seeds, floor in floors.items():
-        physics = timed_share(floor, partial(physics_seconds, floor, engines[seeds]))
-        workloads[f"physics {seeds}"] = physics
-        workloads[f"products {seeds}"] = timed_share(floor, floor.products_seconds)
-        workloads[f"physics as installed {seeds}"] = peers.as_installed()(physics)
     rates = take_turns(workloads, size.repeats)
-    part = "training"
     for name, seeds in names.items():
-        label = f"{seeds} seeds" if seeds > 1 else "1 seed"
         must, aim = (13, 18) if seeds > 1 else (5, 8)
         ratio = ratios(rates[name], rates["peer"])
-        yield measure(part, f"{label} / Stable-Baselines3", ratio, "x", must=must, aim=aim)
+        yield measure(part, f"{named(seeds)} / Stable-Baselines3", ratio, "x", must=must, aim=aim)
         ratio = ratios(rates[name], rates["peer, shared trunk"])
-        yield measure(part, f"{label} / Stable-Baselines3 with the shared trunk", ratio, "x")
-        for clock, physics in (("on, as installed", f"physics as installed {seeds}"), ("off", f"physics {seeds}")):
-            shares = zip(rates[name], rates[physics], rates[f"products {seeds}"], strict=True)
-            fractions = [rate * (1 / steps + 1 / products) for rate, steps, products in shares]
-            targets = {"must": 0.6, "aim": 0.8} if seeds > 1 else {}
-            yield measure(
-                part, f"{label}, fraction of the floor with mj_step's clock {clock}", fractions, "of 1", **targets
-            )
-        physics = ratios(rates[name], rates[f"physics {seeds}"])
-        yield measure(part, f"{label}, share of mj_step calls in its time", physics, "of 1")
-        yield measure(part, f"{label}", rates[name], "steps/s")
+        yield measure(part, f"{named(seeds)} / Stable-Baselines3 with the shared trunk", ratio, "x")
+        yield measure(part, named(seeds), rates[name], "steps/s")
     for name in ("peer", "peer, shared trunk"):
         yield measure(part, name.replace("peer", "Stable-Baselines3"), rates[name], "steps/s")
 
 
-def physics_seconds(floor: peers.Floor, engine: Training) -> float:
-    return floor.physics(engine.state)
+def named(seeds: int) -> str:
+    return f"{seeds} seeds" if seeds > 1 else "1 seed"
 
 
-def timed_share(floor: peers.Floor, share: Callable[[], float]) -> Workload:
-    """Environment steps per second if the seconds of `share` were all that an iteration takes.
+def measure_floor(size: Size) -> Iterator[Measure]:
+    """The engine's time against its own `mj_step` calls and matrix products, early in training and later.
 
-    A workload's time is measured around it, so what only prepares the share is kept out by its own clock: the steps
-    are scaled to the whole call.
+    `mj_step` is timed as the engine runs it, with its profiling clock off. As installed the clock is on, and the call
+    takes so much longer that the engine's whole time is not far above it; that reading has no target.
     """
+    cell = size.cell()
+    for seeds in (size.block, 1):
+        engine, floor = training(cell, seeds), Floor(cell, seeds)
+        targets = {"must": 0.6, "aim": 0.8} if seeds > 1 else {}
+        physics = floor.alone(partial(physics_seconds, floor, engine))
+        workloads = {"engine": engine, "physics": physics, "products": floor.alone(floor.products_seconds)}
+        workloads["as installed"] = peers.as_installed()(physics)
+        for begun in size.floor_begins:
+            while engine.done < begun:
+                engine()
+            rates = take_turns(workloads, size.repeats)
+            label = f"{named(seeds)} from iteration {begun + 1} on"
+            for kind, text in (("physics", ""), ("as installed", ", mj_step as installed")):
+                values = list(map(fraction, rates["engine"], rates[kind], rates["products"]))
+                aims = targets if kind == "physics" else {}
+                yield measure("floor", f"{label}, fraction of the floor{text}", values, "of 1", **aims)
+            share = ratios(rates["engine"], rates["physics"])
+            yield measure("floor", f"{label}, share of mj_step calls", share, "of 1")
 
-    def one() -> float:
-        begun = time.process_time()
-        seconds = share()
-        whole = time.process_time() - begun
-        return len(floor.seeds) * floor.plan.steps * whole / seconds
 
-    return one
+def physics_seconds(floor: Floor, engine: Training) -> float:
+    return floor.physics(engine.state)
 
 
 def measure_evaluation(size: Size) -> Iterator[Measure]:
@@ -294,6 +294,7 @@ def measure_workflow(size: Size) -> Iterator[Measure]:
 
 PARTS = {
     "training": measure_training,
+    "floor": measure_floor,
     "evaluation": measure_evaluation,
     "jobs": measure_jobs,
     "ladder": measure_ladder,

@@ -41,29 +41,29 @@ def test_every_rung_of_the_ladder_trains_the_same_weights():
 
 
 def test_the_floor_holds_every_matrix_product_of_an_iteration():
+    import floor
     import ladder
-    import peers
 
     of = small("l2", iterations=2)
     iterator = ladder.engine(of, [0, 1, 2])
     next(iterator)
     with FlopCounterMode(display=False) as counter:
         next(iterator)
-    floor = sum(
+    expected = sum(
         times * 2 * a.shape[0] * a.shape[1] * a.shape[2] * b.shape[2]
-        for times, operands in peers.matrix_products(of.protocol.ppo, 3)
+        for times, operands in floor.matrix_products(of.protocol.ppo, 3)
         for a, b in operands
     )
-    assert counter.get_total_flops() == floor
+    assert counter.get_total_flops() == expected
 
 
 def test_the_floor_steps_as_the_engine_does_in_its_next_iteration(monkeypatch):
+    import floor
     import ladder
-    import peers
 
     of = small("l2", iterations=2)
     iterator = ladder.engine(of, [0, 1, 2])
-    floor, state = peers.Floor(of, 3), next(iterator)
+    floor_of_three, state = floor.Floor(of, 3), next(iterator)
     step, stepped = mujoco.mj_step, []
 
     def recording(model, data, count):
@@ -71,7 +71,7 @@ def test_the_floor_steps_as_the_engine_does_in_its_next_iteration(monkeypatch):
         step(model, data, count)
 
     monkeypatch.setattr(mujoco, "mj_step", recording)
-    floor.physics(state)  # collects, then steps again
+    floor_of_three.physics(state)  # collects, then steps again
     collected, replayed = np.split(np.array(stepped), 2)
     stepped.clear()
     next(iterator)
@@ -79,11 +79,37 @@ def test_the_floor_steps_as_the_engine_does_in_its_next_iteration(monkeypatch):
     assert np.array_equal(collected, stepped)
 
 
+def test_the_fraction_of_the_floor():
+    import floor
+
+    assert floor.fraction(10, 30, 60) == pytest.approx(0.5)  # 1/30 + 1/60 of a second a step, of 1/10
+
+
+def test_what_prepares_a_share_of_the_floor_does_not_count(monkeypatch):
+    import floor
+
+    of = floor.Floor(small("l2", iterations=1), 3)
+    ticks = iter([2.0, 6.0])
+    monkeypatch.setattr(floor.time, "process_time", lambda: next(ticks))
+    steps = of.alone(lambda: 1.0)()  # a second of the four is the share
+    assert steps / 4.0 == 3 * of.plan.steps / 1.0
+
+
 def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
     command = [sys.executable, str(BENCHMARKS / "run.py"), "--quick", "--out", str(tmp_path)]
     subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True)
     table = pd.read_csv(tmp_path / "results.csv")
-    parts = {"training", "evaluation", "jobs", "ladder", "ladder gain", "seeds per block", "budget", "workflow"}
+    parts = {
+        "training",
+        "floor",
+        "evaluation",
+        "jobs",
+        "ladder",
+        "ladder gain",
+        "seeds per block",
+        "budget",
+        "workflow",
+    }
     assert set(table["part"]) == parts
     assert (table["value"] > 0).all()
     assert ((table["low"] <= table["value"]) & (table["value"] <= table["high"])).all()

@@ -35,7 +35,9 @@ DASH = "\N{EN DASH}"
 
 def decimals(metric: str) -> tuple[int, float]:
     """Decimals of a measure, and the factor it is shown with: distances in mm."""
-    return (1, 1000.0) if metric.endswith("distance") else (2, 1.0) if metric.endswith(("return", "curve")) else (3, 1.0)
+    return (
+        (1, 1000.0) if metric.endswith("distance") else (2, 1.0) if metric.endswith(("return", "curve")) else (3, 1.0)
+    )
 
 
 def interval(row: Mapping[Any, Any], name: str, low: str, high: str, digits: int, factor: float = 1.0) -> str:
