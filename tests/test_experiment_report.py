@@ -7,7 +7,7 @@ import synthetic
 from test_experiments import MEANS, PROTOCOLS, SWITCHES, labelled_runs, peers
 from test_experiments import runs as switched_runs
 
-from reacher_shaping import comparisons, experiment_figures, experiment_report, experiment_tables, experiments
+from reacher_shaping import comparisons, experiment_figures, experiment_report, experiment_tables, experiments, tables
 from reacher_shaping.style import to_bytes
 
 LOGS = pd.DataFrame(
@@ -108,6 +108,25 @@ def test_section_tells_the_correlation_beside_the_published_one(section):
     assert row[2] in said
     assert row[-1].startswith("0.91 [")  # of the main study, made up
     assert section.figures == ["released_cells", "released_log", "released_correlation", "released_forest"]
+
+
+def test_section_sets_every_published_run_beside_ours(released):
+    names = ("table2.csv", "table3.csv", "left_out.csv")
+    published = tables.published_cells(*(pd.read_csv(synthetic.PUBLISHED / name) for name in names))
+    assert len(published) == 24
+    section = experiment_report.section("released", released, LOGS, published=published)
+    grid = section.grids[next(name for name in section.grids if name.startswith("Every published run"))]
+    rows = {row[0]: [entry.replace("\N{MINUS SIGN}", "-") for entry in row[1:]] for row in grid.rows}
+    assert len(rows) == len(released["cells"]) == 8
+    left_out = rows["none_500K_alpha_5"]
+    assert left_out[:3] == ["none", "500K, α₀ = 0.5", "0.296"]
+    assert left_out[4] == "-284.51"
+    cells = released["cells"].set_index(["variant", "budget", "alpha0"])
+    for place, metric in ((3, "success_rate"), (5, "mean_return")):
+        ours = cells.loc[("none", 500_000, 0.5)]
+        digits = 3 if metric == "success_rate" else 2
+        numbers = [ours[f"{metric}{end}"] for end in ("", "_low", "_high")]
+        assert left_out[place] == "{} [{}, {}]".format(*(f"{value:.{digits}f}" for value in numbers))
 
 
 def test_section_lists_our_logs_and_then_the_published_one(section):

@@ -62,11 +62,12 @@ def section(
     given: Mapping[str, pd.DataFrame],
     training_logs: pd.DataFrame,
     main: pd.DataFrame | None = None,
+    published: pd.DataFrame | None = None,
 ) -> Section:
     """What the report says of one experiment.
 
-    `given` are its tables by name (`experiments.SCHEMAS`), `training_logs` the published logs' summaries, and `main`
-    the main study's correlations.
+    `given` are its tables by name (`experiments.SCHEMAS`), `training_logs` the published logs' summaries, `main` the
+    main study's correlations, and `published` all published runs (`tables.published_cells`).
     """
     said, found = [], {}
     keys = [{str(name): value for name, value in row.items()} for row in given["cells"].to_dict("records")]
@@ -84,6 +85,10 @@ def section(
         found["Pearson's correlation over cells [95 % bootstrap interval], and its range over studies of one seed"] = (
             experiment_tables.correlation(given["correlation"], main)
         )
+        if published is not None:
+            found["Every published run, one seed, and ours of the same label, mean over seeds [95 % interval]"] = (
+                experiment_tables.beside(given["cells"], published)
+            )
     if "log" in shown:
         found[
             f"What the protocol's own log shows while training, its moving average over {WINDOW} iterations, mean over "
@@ -108,12 +113,15 @@ def section(
 
 
 def document(
-    given: Mapping[str, Mapping[str, pd.DataFrame]], training_logs: pd.DataFrame, main: pd.DataFrame | None = None
+    given: Mapping[str, Mapping[str, pd.DataFrame]],
+    training_logs: pd.DataFrame,
+    main: pd.DataFrame | None = None,
+    published: pd.DataFrame | None = None,
 ) -> str:
     """All experiments for a notebook, in Markdown with their figures in it; empty where there are none."""
     parts: list[str] = []
     for name, own_tables in given.items():
-        own = section(name, own_tables, training_logs, main)
+        own = section(name, own_tables, training_logs, main, published)
         parts += [f"## {own.title}", own.intro, *own.sentences]
         for figure in own.figures:
             drawn = experiment_figures.draw(figure.removeprefix(f"{name}_"), own_tables, training_logs)

@@ -100,6 +100,22 @@ def _main_correlation(main: pd.DataFrame | None, x: str, y: str) -> str:
     return interval(ours.iloc[0].to_dict(), "r", "ci_low", "ci_high", 2) if len(ours) else DASH
 
 
+def beside(cells: pd.DataFrame, published: pd.DataFrame) -> Grid:
+    """A row per published run: its success and return, and ours of the cell of the same label."""
+    rows = []
+    joined = published.merge(cells, on=tables.CELL, suffixes=("_published", ""))
+    for row in sorted(joined.to_dict("records"), key=cell_order):
+        texts = [str(row["run"]), variant_label(row["variant"]), setting_label(int(row["budget"]), row["alpha0"])]
+        for metric in ("success_rate", "mean_return"):
+            digits, factor = decimals(metric)
+            texts.append(number(factor * row[f"{metric}_published"], digits))
+            texts.append(interval(row, metric, f"{metric}_low", f"{metric}_high", digits, factor))
+        rows.append(texts)
+    headings = ["Published run", "Variant", "Budget, label"]
+    headings += [text for metric in ("success_rate", "mean_return") for text in (f"{NAMES[metric]}, published", "ours")]
+    return Grid(headings, rows, frozenset({0, 1, 2}))
+
+
 def logs(table: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
     """A row per cell, and a row per published log of one of them."""
 

@@ -31,7 +31,8 @@ class Inputs:
     `controller, success_rate, final_success_rate, mean_return, final_distance`; `figures` maps names such as
     `figure_1` to SVG files, in the order to show; `power`, `variance`, `winners` and `spread` are the study's tables of
     these names, `peers` that of the other algorithms, `experiments` those of each further study, `training_logs` the
-    published logs' summaries; `ledger` has the claims' `id, evidence, shown_in`; relative links start at `folder`.
+    published logs' summaries, `every_published` is `published` with the run that the tables leave out; `ledger` has the
+    claims' `id, evidence, shown_in`; relative links start at `folder`.
     """
 
     study: Mapping[str, Any]
@@ -48,6 +49,7 @@ class Inputs:
     peers: pd.DataFrame | None = None
     experiments: Mapping[str, Mapping[str, pd.DataFrame]] = field(default_factory=dict)
     training_logs: pd.DataFrame = field(default_factory=pd.DataFrame)
+    every_published: pd.DataFrame | None = None
     figures: Mapping[str, Path] = field(default_factory=dict)
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
@@ -98,7 +100,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
             picture for name, picture in pictures.items() if not name.startswith(own) and name not in OWN_SECTION
         ],
         "experiments": [
-            experiment_report.section(name, given, inputs.training_logs, inputs.correlation)
+            experiment_report.section(name, given, inputs.training_logs, inputs.correlation, inputs.every_published)
             for name, given in inputs.experiments.items()
         ],
         "departures": departures_grid(inputs.study),

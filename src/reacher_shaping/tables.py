@@ -63,14 +63,16 @@ FORMATS = {
 }
 
 
-def published_cells(table2: pd.DataFrame, table3: pd.DataFrame) -> pd.DataFrame:
-    """The paper's Tables 2 and 3 under our cell keys.
+def published_cells(table2: pd.DataFrame, table3: pd.DataFrame, left_out: pd.DataFrame | None = None) -> pd.DataFrame:
+    """The paper's Tables 2 and 3 under our cell keys, and the run they leave out where it is given.
 
     Result: `variant, budget, alpha0, run, success_rate, mean_return`. Table 3 calls its variants
     `decay200K` and so on too, but shapes with the squared distance.
     """
     frames = []
-    for table, suffix in ((table2, ""), (table3, "_l2sq")):
+    for table, suffix in ((table2, ""), (table3, "_l2sq"), (left_out, "")):
+        if table is None:
+            continue
         frame = table.rename(columns={"alpha": "alpha0"}).astype({"alpha0": float})
         frame["variant"] = frame["variant_base"].str.lower() + suffix
         frame["budget"] = frame["num_episodes"].map(BUDGETS)

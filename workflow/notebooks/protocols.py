@@ -26,7 +26,7 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown
 
-from reacher_shaping import artifacts, experiment_report, experiments, schemas
+from reacher_shaping import artifacts, experiment_report, experiments, schemas, tables
 
 folder = Path(results)
 
@@ -34,8 +34,11 @@ folder = Path(results)
 paths = [path for path in sorted(folder.glob("experiments/*/*")) if path.suffix in (".parquet", ".csv")]
 given = experiments.read(str(path) for path in paths if path.stem in experiments.SCHEMAS)
 training_logs = pd.read_csv(Path(published) / "training_logs.csv")
+theirs = tables.published_cells(
+    *(pd.read_csv(Path(published) / f"{name}.csv") for name in ("table2", "table3", "left_out"))
+)
 main = artifacts.read_table(folder / "correlation.csv", schemas.CORRELATION)
 
 # %%
 nothing = "No further study has been run; `snakemake released attribution standard tuned ablation` does it."
-Markdown(experiment_report.document(given, training_logs, main) or nothing)
+Markdown(experiment_report.document(given, training_logs, main, theirs) or nothing)

@@ -21,6 +21,7 @@ with logged(snakemake.log[0]):
         if "study" in records[0]
         else {"study": json.loads(params.study), "settings_hash": params.settings_hash}
     )
+    published = [pd.read_csv(path) for path in (given.table2, given.table3, given.left_out)]
     inputs = report.Inputs(
         study=told["study"],
         settings_hash=told["settings_hash"],
@@ -36,7 +37,8 @@ with logged(snakemake.log[0]):
         peers=artifacts.read_table(given.peers[0], schemas.PEERS) if given.peers else None,
         experiments=experiments.read(given.experiments),
         training_logs=pd.read_csv(given.training_logs),
-        published=tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3)),
+        published=tables.published_cells(*published[:2]),
+        every_published=tables.published_cells(*published),
         ledger=yaml.safe_load(Path(given.ledger).read_text(encoding="utf-8")),
         figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},
         media=[Path(path) for path in given.media],
