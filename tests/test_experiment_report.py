@@ -88,6 +88,21 @@ def test_log_figure_sets_the_published_peak_and_end_beside_the_curve_of_the_same
     assert marks[0] in figure.axes[0].lines
 
 
+def test_log_figure_shows_the_moving_average_in_which_the_published_log_is_told():
+    key = {"protocol": "released", "variant": "none", "budget": 500_000, "seeds": 5, "low": np.nan, "high": np.nan}
+    curve = -50 - 10 * np.sin(np.arange(245.0))
+    parts = [
+        pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": curve, "alpha0": a, **key}) for a in range(5)
+    ]
+    figure = experiment_figures.log(pd.concat(parts).sample(frac=1, random_state=2), LOGS)
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(shown) == 5
+    assert shown[2].get_position().y1 < shown[0].get_position().y0, "more than three settings stand in rows of two"
+    line = next(line for line in shown[0].lines if line.get_label() == "none")
+    np.testing.assert_allclose(line.get_ydata(), np.convolve(curve, np.ones(20) / 20, mode="valid"))
+    assert (line.get_xdata()[0], line.get_xdata()[-1]) == (20, 245)
+
+
 def test_correlation_figure_has_a_panel_each_for_the_published_and_ours(released):
     figure = experiment_figures.correlation(released["correlation"])
     titles = [axes.get_title(loc="left") for axes in figure.axes[:2]]

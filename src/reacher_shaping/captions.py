@@ -100,8 +100,8 @@ VIEWS = {
     ),
     "log": (
         "Training as logged",
-        "What each protocol's own log shows, mean over seeds. Diamonds: peak and end of the published logs of the same "
-        "cell, their moving average over {window} iterations. Curves that collapse leave the scale.",
+        "What each protocol's own log shows: mean over seeds, moving average over {window} iterations. Diamonds: peak "
+        "and end of the published logs of the same cell, averaged alike. Curves that collapse leave the scale.",
     ),
     "correlation": (
         "The labels' correlations",

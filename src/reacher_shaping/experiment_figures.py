@@ -1,5 +1,6 @@
 """Figures of the further studies. Tables in, matplotlib figures out; no statistic is computed here."""
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -13,6 +14,7 @@ from matplotlib.ticker import PercentFormatter
 
 from reacher_shaping import further, plots
 from reacher_shaping.bars import PUBLISHED
+from reacher_shaping.learning import smooth
 from reacher_shaping.style import (
     STYLE,
     cell_order,
@@ -201,26 +203,29 @@ def _explain_effects(figure: Figure, shown: pd.DataFrame) -> None:
 
 @mpl.rc_context(STYLE)
 def log(logged: pd.DataFrame, training_logs: pd.DataFrame) -> Figure:
-    """Training curves as the released code logs them, a panel per setting; published peaks and ends as diamonds.
+    """Training as each protocol logs it, smoothed, a panel per setting; published peaks and ends as diamonds.
 
     `logged` as `curves.curve_table` gives it; `training_logs` are the published runs' summaries
     (`report/published/training_logs.csv`). The scale leaves out what falls below four times the published lowest.
     """
     keys = ["protocol", "budget", "alpha0"]
     settings = sorted(set(logged[keys].itertuples(index=False, name=None)), key=lambda key: (key[0], -key[2], key[1]))
-    columns = max(len(settings), 1)
-    figure = Figure(figsize=(3.7 * columns + 1.2, 3.8))
-    panels = figure.subplots(1, columns, squeeze=False)[0]
+    columns = 2 if len(settings) > 3 else max(len(settings), 1)
+    rows = math.ceil(len(settings) / columns) or 1
+    figure = Figure(figsize=(3.7 * columns + 1.2, 3.4 * rows + 0.4))
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in panels[len(settings) :]:
+        axes.set_visible(False)
     floor = 4 * training_logs["final_return"].min()
     for axes, setting in zip(panels, settings, strict=False):
         part = logged[(logged[keys] == pd.Series(dict(zip(keys, setting, strict=True)))).all(axis=1)]
         axes.set_title(f"{protocol_label(setting[0])}\n{setting_label(int(setting[1]), setting[2])}")
         for variant in sorted(set(part["variant"]), key=variant_order):
-            line = part[part["variant"] == variant]
-            axes.plot(
-                line["iteration"], line["episode_return"], color=variant_color(variant), label=variant_label(variant)
-            )
-        if part["episode_return"].min() < floor:
+            line = part[part["variant"] == variant].sort_values("iteration")
+            smoothed = smooth(line["episode_return"])[0]
+            iterations = line["iteration"].iloc[-len(smoothed) :]
+            axes.plot(iterations, smoothed, color=variant_color(variant), label=variant_label(variant))
+        if axes.get_ylim()[0] < floor:
             axes.set_ylim(bottom=floor)
         same = (training_logs["protocol"] == setting[0]) & (training_logs["budget"] == setting[1])
         theirs = training_logs[same & (setting[2] == 1)]
@@ -229,8 +234,10 @@ def log(logged: pd.DataFrame, training_logs: pd.DataFrame) -> Figure:
             marker = PUBLISHED | {"color": variant_color(run["variant"])}
             ends = [run["peak_return"], run["final_return"]]
             axes.plot([run["peak_iteration"], last], ends, linestyle="none", label="_published", zorder=4, **marker)
+    for row in panels.reshape(rows, columns):
+        row[0].set_ylabel("Logged return")
+    for axes in panels[-columns:]:
         axes.set_xlabel("PPO iteration")
-    panels[0].set_ylabel("Logged return")
     by_label = {label: line for axes in panels for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     labels, handles = list(by_label), list(by_label.values())
     if any(line.get_label() == "_published" for axes in panels for line in axes.lines):
