@@ -231,6 +231,9 @@ def test_section_corrects_over_the_measures_of_the_only_shaped_cell(released):
     assert f"5 %): distance at the last step (mm) {minus}10.0 [{minus}20.0, 10.0], p 0.045." in changed
     assert f"mean return {minus}0.01 [{minus}0.02, 0.01], p 0.060" in chance
     assert "success" not in changed
+    section = experiment_report.section("tuned", {**released, "comparisons": shaped}, LOGS)
+    rows = section.grids[next(name for name in section.grids if name.endswith("Holm-corrected over a row"))].rows
+    assert [row[3:][1::2] for row in rows] == [["1.000", "1.000", "0.060", "0.045", "1.000"]], "as in the sentence"
     few = experiment_report.shaping_sentence(shaped.assign(seeds=7))  # 5 / 2^6
     assert few == "With 7 seeds no difference between the shaped cell and none can be told from chance."
 

@@ -144,3 +144,12 @@ def test_save_writes_numbers_and_text(tmp_path, cells, published):
     paths = tables.save(tables.table_1(cells, published), "Caption.", tmp_path / "table_1")
     assert [path.name for path in paths] == ["table_1.csv", "table_1.md"]
     assert paths[1].read_text(encoding="utf-8").startswith("Caption.\n\n| Rank |")
+
+
+def test_the_published_tables_and_the_run_they_leave_out_are_all_runs_of_the_release():
+    names = ("table2.csv", "table3.csv", "left_out.csv")
+    told = tables.published_cells(*(pd.read_csv(synthetic.PUBLISHED / name) for name in names)).set_index("run")
+    every = pd.read_csv(synthetic.PUBLISHED / "all_runs_radius_0.02.csv").set_index("run")
+    assert sorted(told.index) == sorted(every.index)
+    assert told["success_rate"].to_dict() == every["success_rate"].to_dict()
+    assert told["mean_return"].to_dict() == every["mean_return"].round(2).to_dict()

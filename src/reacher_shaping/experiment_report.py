@@ -103,8 +103,9 @@ def section(
     shaped = given["comparisons"][given["comparisons"]["family"] == "none"]
     if "effects" not in shown and len(shaped):
         said.append(shaping_sentence(shaped))
-        found["Paired differences to none, mean over seeds [95 % interval]; p is Holm-corrected over a column"] = (
-            experiment_tables.shaping(shaped)
+        family = "a row" if only_cell(shaped) else "a column"
+        found[f"Paired differences to none, mean over seeds [95 % interval]; p is Holm-corrected over {family}"] = (
+            experiment_tables.shaping(corrected(shaped))
         )
     found["Every cell, mean over seeds [95 % interval]"] = experiment_tables.cells(given["cells"])
     title = TITLES.get(name, protocol_label(name).capitalize())
@@ -207,12 +208,22 @@ def agreement_sentence(agreement: pd.DataFrame) -> str:
     return f"{len(apart)} of {len(tested)} measures differ from Stable-Baselines3's beyond chance ({seeds}): {names}."
 
 
+def only_cell(shaped: pd.DataFrame) -> bool:
+    """Whether comparisons to `none` are all of one shaped cell."""
+    return len(shaped) == shaped["metric"].nunique()
+
+
+def corrected(shaped: pd.DataFrame) -> pd.DataFrame:
+    """The comparisons that are shown; of an only shaped cell the measures are the family, elsewhere its cells are."""
+    measured = shaped[shaped["metric"].isin(SHAPING)]
+    return measured.assign(p_holm=stats.holm(measured["p"].to_numpy())) if only_cell(shaped) else measured
+
+
 def shaping_sentence(shaped: pd.DataFrame) -> str:
     """In how many comparisons a shaped cell differs from `none` beyond chance, measure by measure."""
-    measured = shaped[shaped["metric"].isin(SHAPING)]
+    measured, only = corrected(shaped), only_cell(shaped)
     family = measured.groupby(["protocol", "metric"]).size().max()
     seeds = int(shaped["seeds"].max())
-    only = len(measured) == measured["metric"].nunique()
     if (
         2.0 ** (1 - seeds) * (len(measured) if only else family) > LEVEL
     ):  # the smallest p of a sign-flip test, corrected
@@ -233,8 +244,8 @@ def shaping_sentence(shaped: pd.DataFrame) -> str:
 
 
 def _only_cell_sentence(measured: pd.DataFrame) -> str:
-    """What the only shaped cell of a study changes: its family is that of its measures."""
-    rows = measured.assign(p_holm=stats.holm(measured["p"].to_numpy())).set_index("metric").loc[list(SHAPING)]
+    """What the only shaped cell of a study changes."""
+    rows = measured.set_index("metric").loc[list(SHAPING)]
     changed: list[str] = []
     chance: list[str] = []
     for row in rows.reset_index().to_dict("records"):
