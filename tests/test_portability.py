@@ -16,7 +16,8 @@ import torch
 from cells import small
 from reacher_shaping import jobs
 path = Path(sys.argv[1])
-with jobs.trained_block(small("l2", iterations=3), [0, 1], radius=0.02, folder=path / "made", report=print) as (state, _):
+cell = small("l2", iterations=3)
+with jobs.trained_block(cell, [0, 1], radius=0.02, folder=path / "checkpoint", report=print) as (state, _):
     assert torch.get_num_threads() == 1, "a job is one thread"
     state.rows.numpy().tofile(path / "weights")
 """
