@@ -2,7 +2,7 @@ from pathlib import Path
 
 from snakemake.utils import min_version
 
-from reacher_shaping.config import load_study, require_mapping, settings_hash
+from reacher_shaping.settings.study import load_study, require_mapping, settings_hash
 
 min_version("9.0")
 

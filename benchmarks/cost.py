@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from reacher_shaping.config import Study
-from reacher_shaping.reacher import EPISODE_STEPS
+from reacher_shaping.settings.study import Study
+from reacher_shaping.tasks.reacher import EPISODE_STEPS
 
 MODES = 2  # stochastic and deterministic evaluation
 

@@ -7,10 +7,10 @@ import mujoco
 import torch
 from side_by_side import Workload
 
-from reacher_shaping.cell import PPO, Cell
-from reacher_shaping.reacher import ACTION_SIZE, EPISODE_STEPS, OBSERVATION_SIZE
-from reacher_shaping.rollout import Collector, Plan
-from reacher_shaping.train import TrainState
+from reacher_shaping.settings.cell import PPO, Cell
+from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, OBSERVATION_SIZE
+from reacher_shaping.training.rollout import Collector, Plan
+from reacher_shaping.training.train import TrainState
 
 
 def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[torch.Tensor, torch.Tensor]]]]:

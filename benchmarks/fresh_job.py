@@ -10,10 +10,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from reacher_shaping import artifacts, jobs, schemas
-from reacher_shaping.cell import Cell
-from reacher_shaping.provenance import Record
-from reacher_shaping.rollout import Collector
+from reacher_shaping.jobs import training_job
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import write_table
+from reacher_shaping.storage.policy_format import write_policy
+from reacher_shaping.storage.provenance import Record
+from reacher_shaping.training.rollout import Collector
 
 cell = Cell.model_validate_json(sys.argv[1])
 seeds = range(int(sys.argv[2]))
@@ -32,9 +35,9 @@ Collector.collect = noting_the_time  # type: ignore[method-assign]
 
 with tempfile.TemporaryDirectory() as folder:
     block = Path(folder)
-    with jobs.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
-        artifacts.write_policy(block / "policy.pt", list(seeds), state.policy(cell).weights(), {})
-        artifacts.write_table(block / "progress.parquet", state.progress_frame(), schemas.PROGRESS)
+    with training_job.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
+        write_policy(block / "policy.pt", list(seeds), state.policy(cell).weights(), {})
+        write_table(block / "progress.parquet", state.progress_frame(), schemas.PROGRESS)
 # Not getrusage: its peak starts from that of the process that started this one.
 peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
 print(json.dumps([*collected[0], int(peak.split()[1]) / 1024]))

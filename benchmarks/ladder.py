@@ -9,11 +9,11 @@ import plain_loop
 import torch
 from peers import as_installed
 
-from reacher_shaping import ppo, rollout
-from reacher_shaping import train as training
-from reacher_shaping.cell import Cell
-from reacher_shaping.policy import forward, layers
-from reacher_shaping.reacher import ACTION_SIZE, Lanes
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.tasks.reacher import ACTION_SIZE, Lanes
+from reacher_shaping.training import ppo, rollout
+from reacher_shaping.training import train as training
+from reacher_shaping.training.policy import forward, layers
 
 RADIUS = 0.02
 

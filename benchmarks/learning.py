@@ -2,8 +2,9 @@
 
     python benchmarks/learning.py --variant none --budget 500000 --seeds 3 --out benchmarks/learning.json
 
-The plain loop (tests/plain_loop.py) has the engine's random streams, so a seed starts from the same numbers in both and
-drifts apart only by rounding, which training amplifies: after a whole run the two are samples of one distribution.
+The plain loop (tests/oracles/plain_loop.py) has the engine's random streams, so a seed starts from the same numbers in
+both and drifts apart only by rounding, which training amplifies: after a whole run the two are samples of one
+distribution.
 The engine trains ten seeds in the time of a fraction of one plain run.
 """
 
@@ -17,13 +18,13 @@ import numpy as np
 import torch
 from scipy import stats
 
-from reacher_shaping.config import load_study
-from reacher_shaping.evaluate import evaluate
-from reacher_shaping.policy import Policy
-from reacher_shaping.train import train
+from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.settings.study import load_study
+from reacher_shaping.training.policy import Policy
+from reacher_shaping.training.train import train
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "oracles"))
 import plain_loop  # noqa: E402
 
 ENGINE_SEEDS = 10

@@ -10,13 +10,9 @@ from plain_loop import Network
 from side_by_side import Workload
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from reacher_shaping.cell import Cell
-from reacher_shaping.policy import Policy
-from reacher_shaping.reacher import (
-    ACTION_SIZE,
-    EPISODE_STEPS,
-    profiling_clock,
-)
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, profiling_clock
+from reacher_shaping.training.policy import Policy
 
 CLOCK = profiling_clock()
 STOCK_CLOCK = CLOCK.value  # read at import, before any lanes switch it off

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from side_by_side import Measure, machine, versions
 
-from reacher_shaping.config import load_study
+from reacher_shaping.settings.study import load_study
 
 BLOCK = 10
 """Seeds of the block whose rates the cost of a study is reckoned with."""

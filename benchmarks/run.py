@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "tests"))  # the plain loop lives there
+sys.path.insert(0, str(HERE.parent / "tests" / "oracles"))  # the plain loop lives there
 
 import peers
 import torch
@@ -33,13 +33,14 @@ from ladder import RADIUS, engine, rungs
 from present import write
 from side_by_side import Measure, Workload, measure, pin, ratios, take_turns
 
-from reacher_shaping import jobs
-from reacher_shaping.cell import Cell
-from reacher_shaping.config import load_study
-from reacher_shaping.evaluate import LANES_PER_SEED, evaluate
-from reacher_shaping.policy import Policy, initialise
-from reacher_shaping.reacher import EPISODE_STEPS
-from reacher_shaping.train import TrainState
+from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, evaluate
+from reacher_shaping.jobs import training_job
+from reacher_shaping.jobs.checkpoint import save_checkpoint
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.settings.study import load_study
+from reacher_shaping.tasks.reacher import EPISODE_STEPS
+from reacher_shaping.training.policy import Policy, initialise
+from reacher_shaping.training.train import TrainState
 
 TRAINED_LOG_STD = -2.2
 """Policies are evaluated with the spread that training leaves, 0.11; a wide one keeps the arm at its joint limit."""
@@ -204,7 +205,7 @@ def measure_jobs(size: Size) -> Iterator[Measure]:
     yield measure("jobs", f"{label}, start to first rollout", start, "s", must=6, aim=4, lower_is_better=True)
     yield measure("jobs", f"{label}, CPU time of the start", seconds, "s")
     yield measure("jobs", f"{label}, peak memory", memory, "MB", must=800, aim=500, lower_is_better=True)
-    share = [100 * seconds / jobs.SECONDS_PER_CHECKPOINT for seconds in checkpoint_seconds(size)]
+    share = [100 * seconds / training_job.SECONDS_PER_CHECKPOINT for seconds in checkpoint_seconds(size)]
     yield measure("jobs", f"{label}, checkpoints' share of its time", share, "%", must=2, lower_is_better=True)
 
 
@@ -215,7 +216,7 @@ def checkpoint_seconds(size: Size) -> list[float]:
     with tempfile.TemporaryDirectory(dir=HERE.parent) as folder:
         for _ in range(size.repeats + 1):
             begun = time.perf_counter()
-            jobs.save_checkpoint(Path(folder) / "key" / "checkpoint.pt", state)
+            save_checkpoint(Path(folder) / "key" / "checkpoint.pt", state)
             seconds.append(time.perf_counter() - begun)
     return seconds[1:]
 
@@ -275,9 +276,9 @@ def dry_run(seeds: int, folder: Path) -> tuple[int, float, float]:
     # Started by a small process: the peak that the system reports of a process begins with that of its parent.
     between = [sys.executable, "-c", ACCOUNT, *command]
     done = subprocess.run(between, capture_output=True, text=True, check=True)
-    jobs = len(load_study(HERE.parent / "config.yaml").cells) * -(-seeds // BLOCK)
+    training_job = len(load_study(HERE.parent / "config.yaml").cells) * -(-seeds // BLOCK)
     seconds, memory = json.loads(done.stdout.splitlines()[-1])
-    return jobs, seconds, memory
+    return training_job, seconds, memory
 
 
 def measure_workflow(size: Size) -> Iterator[Measure]:
@@ -287,9 +288,9 @@ def measure_workflow(size: Size) -> Iterator[Measure]:
         for _ in range(max(1, size.repeats // 2)):
             with tempfile.TemporaryDirectory() as folder:
                 found.append(dry_run(blocks * BLOCK, Path(folder)))
-        jobs = f"dry run of {found[0][0]} training jobs"
-        yield measure("workflow", f"{jobs}, CPU time", [numbers[1] for numbers in found], "s")
-        yield measure("workflow", f"{jobs}, peak memory", [numbers[2] for numbers in found], "MB")
+        training_job = f"dry run of {found[0][0]} training jobs"
+        yield measure("workflow", f"{training_job}, CPU time", [numbers[1] for numbers in found], "s")
+        yield measure("workflow", f"{training_job}, peak memory", [numbers[2] for numbers in found], "MB")
 
 
 PARTS = {

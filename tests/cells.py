@@ -1,6 +1,6 @@
 """Cells for the tests of the engine, small where size does not matter."""
 
-from reacher_shaping.cell import PPO, Cell, Environment, Log, Protocol, Shaping, Variant
+from reacher_shaping.settings.cell import PPO, Cell, Environment, Log, Protocol, Shaping, Variant
 
 VARIANTS = {
     "none": Variant(name="none", potential="none"),

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from reacher_shaping import tables
+from reacher_shaping.report import paper_tables
 
 PUBLISHED = Path(__file__).parents[1] / "report" / "published"
 
@@ -151,4 +151,4 @@ def controllers():
 
 def published():
     """The paper's tables under our cell keys."""
-    return tables.published_cells(*(pd.read_csv(PUBLISHED / name) for name in ("table2.csv", "table3.csv")))
+    return paper_tables.published_cells(*(pd.read_csv(PUBLISHED / name) for name in ("table2.csv", "table3.csv")))

@@ -6,10 +6,12 @@ import pandas as pd
 import pytest
 import torch
 
-from reacher_shaping import artifacts, cli
-from reacher_shaping.cell import PPO, Cell, Environment, Protocol, Variant
-from reacher_shaping.evaluate import evaluate
-from reacher_shaping.policy import Policy, initialise
+from reacher_shaping import cli
+from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Variant
+from reacher_shaping.storage.files import sha256, write_json
+from reacher_shaping.storage.policy_format import write_policy
+from reacher_shaping.training.policy import Policy, initialise
 
 COLUMNS = ["run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance"]
 
@@ -25,7 +27,7 @@ def ours(policy, tmp_path):
     protocol = Protocol(name="paper", environment=Environment(control_weight=0.25))
     cell = Cell(protocol=protocol, variant=Variant(name="none", potential="none"), budget=2048, root_seed=9)
     path = tmp_path / "policy.pt"
-    artifacts.write_policy(path, [5, 6], policy.weights(), {"cell": cell.settings(), "radius": 0.02})
+    write_policy(path, [5, 6], policy.weights(), {"cell": cell.settings(), "radius": 0.02})
     return path
 
 
@@ -86,7 +88,7 @@ def test_out_that_is_no_file_is_refused_before_anything_is_evaluated(ours, tmp_p
 def test_policy_that_is_not_what_its_training_wrote_is_refused(ours, capsys):
     other = ours.with_name("other.pt")
     other.write_bytes(ours.read_bytes())
-    artifacts.write_json(ours.with_name("training.json"), {"outputs": {"policy.pt": artifacts.sha256(ours)}})
+    write_json(ours.with_name("training.json"), {"outputs": {"policy.pt": sha256(ours)}})
     assert cli.main(["evaluate", str(ours), str(other), "--episodes", "1"]) == 0, "a copy under another name is as good"
     content = bytearray(ours.read_bytes())
     content[len(content) // 2] ^= 1
@@ -180,7 +182,7 @@ def test_impossible_value_is_refused_by_name(option, value, capsys):
 
 
 def test_play_records_the_run_asked_for(ours, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("reacher_shaping.media.find_opengl", lambda: None)
+    monkeypatch.setattr("reacher_shaping.evaluation.video.find_opengl", lambda: None)
     assert cli.main(["play", str(ours), "--run", "6", "--record", str(tmp_path / "a.gif")]) == 0
     assert (tmp_path / "a.gif").read_bytes().startswith(b"GIF89a")
     said = capsys.readouterr().err

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from verify import crate_problems
 
-from reacher_shaping import artifacts
-from reacher_shaping.crate import METADATA, checksums
+from reacher_shaping.storage.crate import METADATA, checksums
+from reacher_shaping.storage.files import ArtifactError, replacing
 
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # of a zip's time stamps; the files' own would differ from copy to copy
 
@@ -21,7 +21,7 @@ EARLIEST = (1980, 1, 1, 0, 0, 0)  # of a zip's time stamps; the files' own would
 def pack(folder: Path, archive: Path) -> int:
     """Write the zip; return how many files it holds."""
     names = [METADATA, *sorted(checksums(folder / METADATA))]
-    with artifacts.replacing(archive) as temporary, zipfile.ZipFile(temporary, "w") as packed:
+    with replacing(archive) as temporary, zipfile.ZipFile(temporary, "w") as packed:
         for name in names:
             entry = zipfile.ZipInfo(name, EARLIEST)
             entry.external_attr = 0o644 << 16
@@ -40,7 +40,7 @@ def main(folder: Path, archive: Path) -> int:
         return 1
     try:
         count = pack(folder, archive)
-    except artifacts.ArtifactError as error:
+    except ArtifactError as error:
         print(error, file=sys.stderr)
         return 1
     print(f"{count} files, {archive.stat().st_size / 1e6:.0f} MB: {archive}")

@@ -13,10 +13,14 @@ from typing import Any
 import pandas as pd
 from snakemake.utils import update_config
 
-from reacher_shaping import artifacts, reference, schemas, tables
-from reacher_shaping.cell import Cell
-from reacher_shaping.config import block_name, load_study, require_mapping, settings_hash
-from reacher_shaping.views import table_files
+from reacher_shaping.report import paper_tables
+from reacher_shaping.report.readme import headline, put_headline, sections
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.settings.outputs import table_files
+from reacher_shaping.settings.study import block_name, load_study, require_mapping, settings_hash
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import ArtifactError, read_json, read_table, write_json, write_text
+from reacher_shaping.storage.reference import keep_experiments, keep_tables, manifest
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
@@ -25,7 +29,7 @@ FIGURE = "headline.svg"
 def manifests(cells: Iterable[Cell], blocks: Iterable[range]) -> list[dict[str, Any]]:
     """The manifests of the blocks of cells."""
     folders = [RESULTS / cell.folder / block_name(seeds) for cell, seeds in product(cells, blocks)]
-    return [artifacts.read_json(folder / "manifest.json") for folder in folders]
+    return [read_json(folder / "manifest.json") for folder in folders]
 
 
 def main() -> None:
@@ -33,32 +37,32 @@ def main() -> None:
     update_config(settings, require_mapping(sys.argv[1]) if len(sys.argv) > 1 else {})
     study = load_study(settings)
     blocks = manifests(study.cells, study.blocks())
-    reference.keep_tables(RESULTS, KEPT)
+    keep_tables(RESULTS, KEPT)
     files = {
         name: table_files(switches=own.switches is not None, peers=own.peers is not None)
         for name, own in study.experiments.items()
     }
-    made = reference.keep_experiments(RESULTS, KEPT, files)
+    made = keep_experiments(RESULTS, KEPT, files)
     further = {
         name: manifests(study.experiment_cells[name], study.blocks(study.experiments[name].seeds)) for name in made
     }
     resolved = study.model_dump(mode="json")
-    peers = [artifacts.read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
-    record = reference.manifest(resolved, settings_hash(study), blocks, further, peers)
-    artifacts.write_json(KEPT / "manifest.json", record)
+    peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
+    record = manifest(resolved, settings_hash(study), blocks, further, peers)
+    write_json(KEPT / "manifest.json", record)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 
-    cells = artifacts.read_table(KEPT / "cells.parquet", schemas.CELLS)
-    claims = artifacts.read_table(KEPT / "claims.csv", schemas.CLAIMS)
-    published = tables.published_cells(*(pd.read_csv(f"report/published/table{number}.csv") for number in (2, 3)))
+    cells = read_table(KEPT / "cells.parquet", schemas.CELLS)
+    claims = read_table(KEPT / "claims.csv", schemas.CLAIMS)
+    published = paper_tables.published_cells(*(pd.read_csv(f"report/published/table{number}.csv") for number in (2, 3)))
     logs = pd.read_csv("report/published/training_logs.csv")
-    text = reference.headline(cells, claims, published, record, f"{KEPT}/{FIGURE}", reference.sections(KEPT, logs))
-    artifacts.write_text(README, reference.put_headline(README.read_text(encoding="utf-8"), text))
+    text = headline(cells, claims, published, record, f"{KEPT}/{FIGURE}", sections(KEPT, logs))
+    write_text(README, put_headline(README.read_text(encoding="utf-8"), text))
     print(f"The reference run: {KEPT} and README.md")
 
 
 if __name__ == "__main__":
     try:
         main()
-    except (artifacts.ArtifactError, OSError, ValueError) as error:
+    except (ArtifactError, OSError, ValueError) as error:
         sys.exit(f"{error}")

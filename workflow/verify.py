@@ -9,8 +9,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from reacher_shaping import artifacts
-from reacher_shaping.crate import METADATA, checksums
+from reacher_shaping.storage.crate import METADATA, checksums
+from reacher_shaping.storage.files import ArtifactError, read_json, sha256
 
 
 def blocks(folder: Path) -> list[Path]:
@@ -26,11 +26,11 @@ def block_problems(folder: Path) -> list[str]:
     for block in blocks(folder):
         path = block / "manifest.json"
         try:
-            outputs = artifacts.read_json(path).get("outputs") if path.exists() else {path.name: ""}
+            outputs = read_json(path).get("outputs") if path.exists() else {path.name: ""}
             if not isinstance(outputs, Mapping):
-                raise artifacts.ArtifactError(path, "holds no outputs")
+                raise ArtifactError(path, "holds no outputs")
             found += differing(block, outputs)
-        except artifacts.ArtifactError as error:
+        except ArtifactError as error:
             found.append(str(error))
     return found
 
@@ -39,7 +39,7 @@ def crate_problems(folder: Path) -> list[str]:
     """The same for the files that the study's crate lists."""
     try:
         return differing(folder, checksums(folder / METADATA))
-    except artifacts.ArtifactError as error:
+    except ArtifactError as error:
         return [str(error)]
 
 
@@ -50,7 +50,7 @@ def differing(folder: Path, expected: Mapping[str, str]) -> list[str]:
         file = folder / name
         if not file.exists():
             found.append(f"{file}: is missing; snakemake makes it again")
-        elif artifacts.sha256(file) != checksum:
+        elif sha256(file) != checksum:
             found.append(f"{file}: has changed since it was made; delete it and run snakemake again")
     return found
 

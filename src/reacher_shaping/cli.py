@@ -13,7 +13,6 @@ PROGRAM = "reacher-shaping"
 COLUMNS = ("run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance")
 RECORDINGS = (".gif", ".mp4")
 MOST_EPISODES = 10**6
-
 _DESCRIPTION = "Play, record and evaluate trained policies on Reacher-v5."
 _EPILOG = (
     "A policy is a policy.pt of this project (several runs, one a seed) or one state dict in the layout of the "
@@ -25,8 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status: 0, or 1 with one line on stderr; argparse exits with 2."""
     options = parser().parse_args(arguments)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from reacher_shaping.artifacts import ArtifactError  # after the arguments: --help needs no numerics
-    from reacher_shaping.window import NoDisplayError
+    from reacher_shaping.evaluation.viewer import NoDisplayError
+    from reacher_shaping.storage.files import ArtifactError  # after the arguments: --help needs no numerics
 
     try:
         options.run_command(options)
@@ -91,11 +90,11 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _play(options: argparse.Namespace) -> None:
-    from reacher_shaping import media, window
-    from reacher_shaping.policy_files import load_policies
+    from reacher_shaping.evaluation import video, viewer
+    from reacher_shaping.evaluation.policies import load_policies
 
     if options.record is None:
-        window.require_display()
+        viewer.require_display()
     trained = load_policies(options.policy)
     seed = trained.seeds[0] if options.run is None else options.run
     if seed not in trained.seeds:
@@ -106,7 +105,7 @@ def _play(options: argparse.Namespace) -> None:
     root_seed = trained.root_seed if options.seed is None else options.seed
     clip = trained.environment.clip_actions
     if options.record is None:
-        mean = window.play(
+        mean = viewer.play(
             act,
             episodes=options.episodes,
             mode=options.mode,
@@ -116,7 +115,7 @@ def _play(options: argparse.Namespace) -> None:
         )
         _say(f"run {seed}: mean return {mean:.2f} at control weight {weight:g}")
         return
-    episode = media.evaluation_episode(
+    episode = video.evaluation_episode(
         act,
         seed,
         mode=options.mode,
@@ -126,7 +125,7 @@ def _play(options: argparse.Namespace) -> None:
         clip_actions=clip,
     )
     name = trained.name or options.policy.parent.name or options.policy.stem
-    media.write_video(options.record, media.frames(episode, f"{name}, run {seed}, episode seed {root_seed}"))
+    video.write_video(options.record, video.frames(episode, f"{name}, run {seed}, episode seed {root_seed}"))
     _say(f"{options.record}: run {seed}, return {episode.episode_return:.2f} at control weight {weight:g}")
 
 
@@ -135,9 +134,9 @@ def _evaluate(options: argparse.Namespace) -> None:
     import pandas as pd
     import torch
 
-    from reacher_shaping.artifacts import require_replaceable, write_text
-    from reacher_shaping.evaluate import evaluate
-    from reacher_shaping.policy_files import load_policies
+    from reacher_shaping.evaluation.evaluate import evaluate
+    from reacher_shaping.evaluation.policies import load_policies
+    from reacher_shaping.storage.files import require_replaceable, write_text
 
     torch.set_num_threads(1)
     if options.out is not None:
@@ -222,7 +221,5 @@ _radius = _number(0, "a number of m above 0", strict=True)
 _weight = _number(0, "a number from 0 on", strict=False)
 _count = _whole(1, MOST_EPISODES, f"a whole number from 1 to {MOST_EPISODES}")
 _seed = _whole(0, 2**63 - 1, "a whole number from 0 on")
-
-
 if __name__ == "__main__":
     sys.exit(main())

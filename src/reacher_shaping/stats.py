@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
@@ -284,3 +285,10 @@ def seeds_needed(effect: float, deviation: float, target: float = 0.8, most: int
         middle = (low + high) // 2
         low, high = (low, middle) if power(effect, deviation, middle) >= target else (middle, high)
     return float(high)
+
+
+def with_holm(frame: pd.DataFrame, family: list[str]) -> pd.DataFrame:
+    """The frame with `p_holm` after `p`, corrected over the rows that share `family`."""
+    corrected = frame.groupby(family)["p"].transform(holm) if len(frame) else pd.Series(dtype=float)
+    frame.insert(list(frame.columns).index("p") + 1, "p_holm", corrected)
+    return frame

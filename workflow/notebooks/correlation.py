@@ -25,20 +25,24 @@ from pathlib import Path
 
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, plots, schemas, style
+from reacher_shaping.figures import paper
+from reacher_shaping.figures.style import to_bytes
+from reacher_shaping.report import captions
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
-ours = artifacts.read_table(folder / "correlation.csv", schemas.CORRELATION)
-published_correlation = artifacts.read_table(folder / "correlation_published.csv", schemas.CORRELATION)
+cells = read_table(folder / "cells.parquet", schemas.CELLS)
+ours = read_table(folder / "correlation.csv", schemas.CORRELATION)
+published_correlation = read_table(folder / "correlation_published.csv", schemas.CORRELATION)
 
 # %% [markdown]
 # Beside ours: the same code applied to the published Table 2.
 
 # %%
-SVG(style.to_bytes(plots.figure_3(ours, published_correlation, protocol), "svg"))
+SVG(to_bytes(paper.figure_3(ours, published_correlation, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_3", cells, protocol=protocol))

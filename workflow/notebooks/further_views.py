@@ -27,22 +27,26 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, further, grids, precision, schemas, style, tables
+from reacher_shaping.figures import robustness
+from reacher_shaping.figures.style import to_bytes
+from reacher_shaping.report import captions, paper_tables, seed_uncertainty, text_tables
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
-runs = artifacts.read_table(folder / "runs.parquet", schemas.RUNS)
-comparisons = artifacts.read_table(folder / "comparisons.parquet", schemas.COMPARISONS)
-radii = artifacts.read_table(folder / "radii.parquet", schemas.RADII)
-lengths = artifacts.read_table(folder / "lengths.parquet", schemas.LENGTHS)
-power = artifacts.read_table(folder / "power.parquet", schemas.POWER)
-variance = artifacts.read_table(folder / "variance.parquet", schemas.VARIANCE)
-lottery = artifacts.read_table(folder / "lottery.csv", schemas.LOTTERY)
-winners = artifacts.read_table(folder / "winners.csv", schemas.WINNERS)
-spread = artifacts.read_table(folder / "spread.csv", schemas.SPREAD)
-theirs = tables.published_cells(
+cells = read_table(folder / "cells.parquet", schemas.CELLS)
+runs = read_table(folder / "runs.parquet", schemas.RUNS)
+comparisons = read_table(folder / "comparisons.parquet", schemas.COMPARISONS)
+radii = read_table(folder / "radii.parquet", schemas.RADII)
+lengths = read_table(folder / "lengths.parquet", schemas.LENGTHS)
+power = read_table(folder / "power.parquet", schemas.POWER)
+variance = read_table(folder / "variance.parquet", schemas.VARIANCE)
+lottery = read_table(folder / "lottery.csv", schemas.LOTTERY)
+winners = read_table(folder / "winners.csv", schemas.WINNERS)
+spread = read_table(folder / "spread.csv", schemas.SPREAD)
+theirs = paper_tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),
 )
@@ -51,7 +55,7 @@ theirs = tables.published_cells(
 # ## Every run
 
 # %%
-SVG(style.to_bytes(further.seed_strip(runs, cells, theirs, protocol=protocol), "svg"))
+SVG(to_bytes(robustness.seed_strip(runs, cells, theirs, protocol=protocol), "svg"))
 
 # %%
 Markdown(captions.caption("seed_strip", cells, runs, protocol))
@@ -60,7 +64,7 @@ Markdown(captions.caption("seed_strip", cells, runs, protocol))
 # ## Differences to no shaping, paired by seed
 
 # %%
-SVG(style.to_bytes(further.forest(comparisons, protocol=protocol), "svg"))
+SVG(to_bytes(robustness.forest(comparisons, protocol=protocol), "svg"))
 
 # %%
 Markdown(captions.caption("forest", cells, runs, protocol))
@@ -69,7 +73,7 @@ Markdown(captions.caption("forest", cells, runs, protocol))
 # ## Does it hang on the radius?
 
 # %%
-SVG(style.to_bytes(further.success_by_radius(radii, protocol), "svg"))
+SVG(to_bytes(robustness.success_by_radius(radii, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("success_by_radius", cells, runs, protocol))
@@ -78,7 +82,7 @@ Markdown(captions.caption("success_by_radius", cells, runs, protocol))
 # ## Longer episodes than in training
 
 # %%
-SVG(style.to_bytes(further.long_episodes(lengths, protocol, metric="final_distance"), "svg"))
+SVG(to_bytes(robustness.long_episodes(lengths, protocol, metric="final_distance"), "svg"))
 
 # %%
 Markdown(captions.caption("long_episodes", cells, runs, protocol))
@@ -87,11 +91,17 @@ Markdown(captions.caption("long_episodes", cells, runs, protocol))
 # ## Better measures
 
 # %%
-Markdown(tables.to_markdown(tables.behaviour(cells, protocol), captions.caption("behaviour", cells, runs, protocol)))
+Markdown(
+    paper_tables.to_markdown(
+        paper_tables.behaviour(cells, protocol), captions.caption("behaviour", cells, runs, protocol)
+    )
+)
 
 # %%
 Markdown(
-    tables.to_markdown(tables.learning(cells, runs, protocol), captions.caption("learning", cells, runs, protocol))
+    paper_tables.to_markdown(
+        paper_tables.learning(cells, runs, protocol), captions.caption("learning", cells, runs, protocol)
+    )
 )
 
 # %% [markdown]
@@ -99,31 +109,31 @@ Markdown(
 # The paper trained each cell once. Drawing one of our runs per cell, again and again, gives studies like it.
 
 # %%
-SVG(style.to_bytes(further.lottery(lottery), "svg"))
+SVG(to_bytes(robustness.lottery(lottery), "svg"))
 
 # %%
 Markdown(captions.caption("lottery", cells, runs, protocol))
 
 # %%
-Markdown(precision.winners_sentence(winners))
+Markdown(seed_uncertainty.winners_sentence(winners))
 
 # %%
-Markdown(grids.to_markdown(precision.winners_grid(winners)))
+Markdown(text_tables.to_markdown(seed_uncertainty.winners_grid(winners)))
 
 # %%
-Markdown(grids.to_markdown(precision.spread_grid(spread, theirs)))
+Markdown(text_tables.to_markdown(seed_uncertainty.spread_grid(spread, theirs)))
 
 # %% [markdown]
 # ## How many seeds does it take?
 
 # %%
-Markdown(precision.power_sentence(power, protocol))
+Markdown(seed_uncertainty.power_sentence(power, protocol))
 
 # %%
-Markdown(grids.to_markdown(precision.power_grid(power, protocol)))
+Markdown(text_tables.to_markdown(seed_uncertainty.power_grid(power, protocol)))
 
 # %%
-Markdown(precision.variance_sentence(variance, protocol))
+Markdown(seed_uncertainty.variance_sentence(variance, protocol))
 
 # %%
-Markdown(grids.to_markdown(precision.variance_grid(variance, protocol)))
+Markdown(text_tables.to_markdown(seed_uncertainty.variance_grid(variance, protocol)))

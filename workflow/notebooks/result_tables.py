@@ -26,13 +26,15 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown
 
-from reacher_shaping import artifacts, captions, schemas, tables
+from reacher_shaping.report import captions, paper_tables
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
-theirs = tables.published_cells(
+cells = read_table(folder / "cells.parquet", schemas.CELLS)
+theirs = paper_tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),
 )
@@ -41,19 +43,19 @@ theirs = tables.published_cells(
 # ## Table 1
 
 # %%
-table = tables.table_1(cells, theirs, protocol)
-Markdown(tables.to_markdown(table, captions.caption("table_1", cells, None, protocol)))
+table = paper_tables.table_1(cells, theirs, protocol)
+Markdown(paper_tables.to_markdown(table, captions.caption("table_1", cells, None, protocol)))
 
 # %% [markdown]
 # ## Table 2
 
 # %%
-table = tables.table_2(cells, theirs, protocol)
-Markdown(tables.to_markdown(table, captions.caption("table_2", cells, None, protocol)))
+table = paper_tables.table_2(cells, theirs, protocol)
+Markdown(paper_tables.to_markdown(table, captions.caption("table_2", cells, None, protocol)))
 
 # %% [markdown]
 # ## Table 3
 
 # %%
-table = tables.table_3(cells, theirs, protocol)
-Markdown(tables.to_markdown(table, captions.caption("table_3", cells, None, protocol)))
+table = paper_tables.table_3(cells, theirs, protocol)
+Markdown(paper_tables.to_markdown(table, captions.caption("table_3", cells, None, protocol)))

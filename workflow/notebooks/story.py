@@ -32,19 +32,24 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import answers, artifacts, captions, plots, schemas, style, tables
+from reacher_shaping.figures import paper
+from reacher_shaping.figures.style import to_bytes
+from reacher_shaping.report import captions, paper_tables
+from reacher_shaping.report.summary import claims_markdown, summary, to_markdown
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
-runs = artifacts.read_table(folder / "runs.parquet", schemas.RUNS)
-lines = artifacts.read_table(folder / "curves.parquet", schemas.CURVES)
-correlation = artifacts.read_table(folder / "correlation.csv", schemas.CORRELATION)
-published_correlation = artifacts.read_table(folder / "correlation_published.csv", schemas.CORRELATION)
+cells = read_table(folder / "cells.parquet", schemas.CELLS)
+runs = read_table(folder / "runs.parquet", schemas.RUNS)
+lines = read_table(folder / "curves.parquet", schemas.CURVES)
+correlation = read_table(folder / "correlation.csv", schemas.CORRELATION)
+published_correlation = read_table(folder / "correlation_published.csv", schemas.CORRELATION)
 claims_file = folder / "claims.csv"
-claims = artifacts.read_table(claims_file, schemas.CLAIMS) if claims_file.exists() else None
-theirs = tables.published_cells(
+claims = read_table(claims_file, schemas.CLAIMS) if claims_file.exists() else None
+theirs = paper_tables.published_cells(
     pd.read_csv(Path(published) / "table2.csv"),
     pd.read_csv(Path(published) / "table3.csv"),
 )
@@ -53,7 +58,7 @@ theirs = tables.published_cells(
 # ## In short
 
 # %%
-Markdown(answers.to_markdown(answers.summary(cells, claims, protocol)))
+Markdown(to_markdown(summary(cells, claims, protocol)))
 
 # %% [markdown]
 # ## What was run
@@ -67,7 +72,7 @@ ours.pivot(index="variant", columns=["budget", "alpha0"], values="seeds").astype
 # The environment's own return, without the shaping terms, iteration by iteration.
 
 # %%
-SVG(style.to_bytes(plots.figure_1(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_1(lines, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_1", cells, runs, protocol))
@@ -78,41 +83,41 @@ Markdown(captions.caption("figure_1", cells, runs, protocol))
 # that merely flails earns some successes too, so the tables also give success at the last step.
 
 # %%
-SVG(style.to_bytes(plots.figure_2(cells, theirs, protocol), "svg"))
+SVG(to_bytes(paper.figure_2(cells, theirs, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_2", cells, runs, protocol))
 
 # %%
-table = tables.table_1(cells, theirs, protocol)
-Markdown(tables.to_markdown(table, captions.caption("table_1", cells, runs, protocol)))
+table = paper_tables.table_1(cells, theirs, protocol)
+Markdown(paper_tables.to_markdown(table, captions.caption("table_1", cells, runs, protocol)))
 
 # %% [markdown]
 # ## Does a better return mean more success?
 
 # %%
-SVG(style.to_bytes(plots.figure_3(correlation, published_correlation, protocol), "svg"))
+SVG(to_bytes(paper.figure_3(correlation, published_correlation, protocol), "svg"))
 
 # %% [markdown]
 # ## The experiment of the appendix
 # Decayed shaping with the squared distance.
 
 # %%
-SVG(style.to_bytes(plots.figure_4(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_4(lines, protocol), "svg"))
 
 # %%
-table = tables.table_3(cells, theirs, protocol)
-Markdown(tables.to_markdown(table, captions.caption("table_3", cells, runs, protocol)))
+table = paper_tables.table_3(cells, theirs, protocol)
+Markdown(paper_tables.to_markdown(table, captions.caption("table_3", cells, runs, protocol)))
 
 # %% [markdown]
 # ## All cells
 
 # %%
-table = tables.table_2(cells, theirs, protocol)
-Markdown(tables.to_markdown(table, captions.caption("table_2", cells, runs, protocol)))
+table = paper_tables.table_2(cells, theirs, protocol)
+Markdown(paper_tables.to_markdown(table, captions.caption("table_2", cells, runs, protocol)))
 
 # %% [markdown]
 # ## Which claims stand
 
 # %%
-Markdown("The claims have not been tested in this study." if claims is None else answers.claims_markdown(claims))
+Markdown("The claims have not been tested in this study." if claims is None else claims_markdown(claims))

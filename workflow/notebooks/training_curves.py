@@ -25,19 +25,23 @@ from pathlib import Path
 
 from IPython.display import SVG, Markdown
 
-from reacher_shaping import artifacts, captions, plots, schemas, style
+from reacher_shaping.figures import paper
+from reacher_shaping.figures.style import to_bytes
+from reacher_shaping.report import captions
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 folder = Path(results)
 
 # %%
-cells = artifacts.read_table(folder / "cells.parquet", schemas.CELLS)
-lines = artifacts.read_table(folder / "curves.parquet", schemas.CURVES)
+cells = read_table(folder / "cells.parquet", schemas.CELLS)
+lines = read_table(folder / "curves.parquet", schemas.CURVES)
 
 # %% [markdown]
 # ## Constant and decayed shaping with the plain distance, and L2² with a constant weight
 
 # %%
-SVG(style.to_bytes(plots.figure_1(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_1(lines, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_1", cells, protocol=protocol))
@@ -46,7 +50,7 @@ Markdown(captions.caption("figure_1", cells, protocol=protocol))
 # ## Decayed shaping with the squared distance
 
 # %%
-SVG(style.to_bytes(plots.figure_4(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_4(lines, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_4", cells, protocol=protocol))

@@ -1,5 +1,5 @@
 # The cells of all studies, and the seed blocks they are trained in.
-from reacher_shaping.config import block_name
+from reacher_shaping.settings.study import block_name
 
 EXPERIMENTS = STUDY.experiment_cells  # the further studies' cells, see experiments.smk
 CELLS = {cell.folder: cell for cells in [STUDY.cells, *EXPERIMENTS.values()] for cell in cells}

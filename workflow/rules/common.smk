@@ -3,8 +3,8 @@ import json
 import os
 import sys
 
-from reacher_shaping.cell import ConfigError
-from reacher_shaping.provenance import code_hash
+from reacher_shaping.settings.base import ConfigError
+from reacher_shaping.storage.code_hash import code_hash
 
 os.environ.update(OMP_NUM_THREADS="1")  # one thread a job; Snakemake fills the cores with jobs
 

@@ -1,5 +1,5 @@
 # What a further study is made of and makes, by its name.
-from reacher_shaping.views import VIEWS, table_files, views
+from reacher_shaping.settings.outputs import VIEWS, table_files, views
 
 
 def of_experiment(make):

@@ -3,8 +3,11 @@
 import pandas as pd
 from job import logged
 
-from reacher_shaping import aggregate, artifacts, curves, schemas
-from reacher_shaping.provenance import unchanged
+from reacher_shaping.analysis import learning_curves
+from reacher_shaping.analysis.runs import cells_frame, runs_frame
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table, write_table
+from reacher_shaping.storage.provenance import unchanged
 
 params, output = snakemake.params, snakemake.output
 files = list(zip(params.cells, snakemake.input.progress, snakemake.input.episodes, strict=True))
@@ -13,15 +16,15 @@ with logged(snakemake.log[0]):
     blocks = (
         (
             cell,
-            artifacts.read_table(unchanged(progress), schemas.PROGRESS),
-            artifacts.read_table(unchanged(episodes), schemas.EPISODES),
+            read_table(unchanged(progress), schemas.PROGRESS),
+            read_table(unchanged(episodes), schemas.EPISODES),
         )
         for cell, progress, episodes in files
     )
-    runs = aggregate.runs_frame(blocks)
+    runs = runs_frame(blocks)
     progress = pd.concat(
-        [artifacts.read_table(path, schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
+        [read_table(path, schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
     )
-    artifacts.write_table(output.runs, runs, schemas.RUNS)
-    artifacts.write_table(output.cells, aggregate.cells_frame(runs, params.root_seed), schemas.CELLS)
-    artifacts.write_table(output.curves, curves.curve_table(progress), schemas.CURVES)
+    write_table(output.runs, runs, schemas.RUNS)
+    write_table(output.cells, cells_frame(runs, params.root_seed), schemas.CELLS)
+    write_table(output.curves, learning_curves.curve_table(progress), schemas.CURVES)

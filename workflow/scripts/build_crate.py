@@ -6,7 +6,8 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping import artifacts, crate
+from reacher_shaping.storage import crate
+from reacher_shaping.storage.files import seal, write_json
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
@@ -18,7 +19,7 @@ def files(paths: Iterable[str]) -> Iterator[Path]:
 
 
 with logged(snakemake.log[0]):
-    artifacts.write_json(output.settings, {"study": json.loads(params.study), "sha256": params.settings_hash})
+    write_json(output.settings, {"study": json.loads(params.study), "sha256": params.settings_hash})
     settings = Path(output.settings)
     found = crate.describe(
         [*set(files(given.files)), settings],
@@ -27,5 +28,5 @@ with logged(snakemake.log[0]):
         name="Reward shaping for PPO on Reacher-v5",
         description=f"A run of the reacher-shaping study with {params.cells} cells of {params.seeds} seeds.",
     )
-    artifacts.write_json(output.crate, found)
-    artifacts.seal(output.crate)
+    write_json(output.crate, found)
+    seal(output.crate)

@@ -2,14 +2,16 @@
 
 from job import logged
 
-from reacher_shaping import artifacts, checks, schemas
+from reacher_shaping.analysis import sanity
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table, write_text
 
 params = snakemake.params
 
 with logged(snakemake.log[0]):
-    runs = artifacts.read_table(snakemake.input.runs, schemas.RUNS)
-    cells = artifacts.read_table(snakemake.input.cells, schemas.CELLS)
-    problems = checks.problems(runs, cells, params.cells, seeds=params.seeds, episodes=params.episodes)
+    runs = read_table(snakemake.input.runs, schemas.RUNS)
+    cells = read_table(snakemake.input.cells, schemas.CELLS)
+    problems = sanity.problems(runs, cells, params.cells, seeds=params.seeds, episodes=params.episodes)
     if problems:
         raise ValueError("; ".join(problems))
-    artifacts.write_text(snakemake.output[0], f"{len(runs)} runs of {len(cells)} cells: complete and plausible\n")
+    write_text(snakemake.output[0], f"{len(runs)} runs of {len(cells)} cells: complete and plausible\n")

@@ -3,19 +3,23 @@
 import pandas as pd
 from job import logged
 
-from reacher_shaping import aggregate, artifacts, comparisons, lottery, schemas, tables
+from reacher_shaping.analysis import comparisons, single_seed_studies
+from reacher_shaping.random_streams import generator
+from reacher_shaping.report import paper_tables
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table, write_table
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
-    runs = artifacts.read_table(given.runs, schemas.RUNS)
-    published = tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
+    runs = read_table(given.runs, schemas.RUNS)
+    published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     compared = comparisons.comparison_frame(runs, params.root_seed)
-    artifacts.write_table(output.comparisons, compared, schemas.COMPARISONS)
-    artifacts.write_table(output.variance, comparisons.variance_frame(runs), schemas.VARIANCE)
-    artifacts.write_table(output.power, comparisons.power_frame(runs, published), schemas.POWER)
-    random = aggregate.generator(params.root_seed, "lottery")
-    studies = lottery.single_seed_studies(runs[runs["protocol"] == params.protocol], random)
-    artifacts.write_table(output.lottery, lottery.lottery_frame(studies), schemas.LOTTERY)
-    artifacts.write_table(output.winners, lottery.winners_frame(studies), schemas.WINNERS)
-    artifacts.write_table(output.spread, lottery.spread_frame(studies), schemas.SPREAD)
+    write_table(output.comparisons, compared, schemas.COMPARISONS)
+    write_table(output.variance, comparisons.variance_frame(runs), schemas.VARIANCE)
+    write_table(output.power, comparisons.power_frame(runs, published), schemas.POWER)
+    random = generator(params.root_seed, "lottery")
+    studies = single_seed_studies.single_seed_studies(runs[runs["protocol"] == params.protocol], random)
+    write_table(output.lottery, single_seed_studies.lottery_frame(studies), schemas.LOTTERY)
+    write_table(output.winners, single_seed_studies.winners_frame(studies), schemas.WINNERS)
+    write_table(output.spread, single_seed_studies.spread_frame(studies), schemas.SPREAD)

@@ -7,12 +7,14 @@ import pandas as pd
 import torch
 from job import logged
 
-from reacher_shaping import artifacts, schemas
-from reacher_shaping.cell import Environment
-from reacher_shaping.config import Evaluation
-from reacher_shaping.evaluate import evaluate
-from reacher_shaping.policy import Policy
-from reacher_shaping.provenance import Record, merged_manifest, unchanged
+from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.settings.cell import Environment
+from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_json, write_json, write_table
+from reacher_shaping.storage.policy_format import read_policy
+from reacher_shaping.storage.provenance import Record, merged_manifest, unchanged
+from reacher_shaping.training.policy import Policy
 
 record = Record()
 params, block = snakemake.params, Path(snakemake.output.episodes).parent
@@ -21,7 +23,7 @@ environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    trained = artifacts.read_policy(unchanged(snakemake.input.policy))
+    trained = read_policy(unchanged(snakemake.input.policy))
     policy = Policy.from_weights(trained.weights)
     frames = [
         evaluate(
@@ -37,10 +39,8 @@ with logged(snakemake.log[0]):
         for mode in ("stochastic", "deterministic")
     ]
     episodes = pd.concat(frames, ignore_index=True)
-    artifacts.write_table(snakemake.output.episodes, episodes, schemas.EPISODES)
+    write_table(snakemake.output.episodes, episodes, schemas.EPISODES)
     files = [Path(snakemake.output.episodes)]
     part = record.to_dict(block, [Path(snakemake.input.policy)], files, 50 * len(episodes), snakemake.threads)
     part = {"settings": json.loads(params.evaluation), "code": params.code, **part}
-    artifacts.write_json(
-        snakemake.output.manifest, merged_manifest(artifacts.read_json(snakemake.input.training), part)
-    )
+    write_json(snakemake.output.manifest, merged_manifest(read_json(snakemake.input.training), part))

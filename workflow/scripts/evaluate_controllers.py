@@ -6,10 +6,11 @@ import pandas as pd
 import torch
 from job import logged
 
-from reacher_shaping import artifacts, schemas
-from reacher_shaping.cell import Protocol
-from reacher_shaping.config import Evaluation
-from reacher_shaping.controllers import evaluate_controllers
+from reacher_shaping.evaluation.controllers import evaluate_controllers
+from reacher_shaping.settings.cell import Protocol
+from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import write_table
 
 params = snakemake.params
 evaluation = Evaluation.model_validate_json(params.evaluation)
@@ -28,4 +29,4 @@ with logged(snakemake.log[0]):
         ).assign(protocol=protocol.name)
         for protocol in protocols
     ]
-    artifacts.write_table(snakemake.output[0], pd.concat(rows, ignore_index=True), schemas.CONTROLLERS)
+    write_table(snakemake.output[0], pd.concat(rows, ignore_index=True), schemas.CONTROLLERS)

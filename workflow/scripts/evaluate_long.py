@@ -3,19 +3,21 @@
 import torch
 from job import logged
 
-from reacher_shaping import artifacts, schemas
-from reacher_shaping.cell import Environment
-from reacher_shaping.config import Evaluation
-from reacher_shaping.long_episodes import evaluate_lengths
-from reacher_shaping.policy import Policy
-from reacher_shaping.provenance import unchanged
+from reacher_shaping.evaluation.episode_lengths import evaluate_lengths
+from reacher_shaping.settings.cell import Environment
+from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import write_table
+from reacher_shaping.storage.policy_format import read_policy
+from reacher_shaping.storage.provenance import unchanged
+from reacher_shaping.training.policy import Policy
 
 params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    trained = artifacts.read_policy(unchanged(snakemake.input.policy))
+    trained = read_policy(unchanged(snakemake.input.policy))
     long = evaluate_lengths(
         Policy.from_weights(trained.weights).act,
         trained.seeds,
@@ -25,4 +27,4 @@ with logged(snakemake.log[0]):
         clip_actions=environment.clip_actions,
         root_seed=params.root_seed,
     )
-    artifacts.write_table(snakemake.output[0], long, schemas.LONG_EPISODES)
+    write_table(snakemake.output[0], long, schemas.LONG_EPISODES)

@@ -5,18 +5,20 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, captions, schemas, tables
+from reacher_shaping.report import captions, paper_tables
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 with logged(snakemake.log[0]):
-    cells = artifacts.read_table(snakemake.input.cells, schemas.CELLS)
-    runs = artifacts.read_table(snakemake.input.runs, schemas.RUNS)
-    published = tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))
+    cells = read_table(snakemake.input.cells, schemas.CELLS)
+    runs = read_table(snakemake.input.runs, schemas.RUNS)
+    published = paper_tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))
     frames = {
-        "table_1": tables.table_1(cells, published),
-        "table_2": tables.table_2(cells, published),
-        "table_3": tables.table_3(cells, published),
-        "behaviour": tables.behaviour(cells),
-        "learning": tables.learning(cells, runs),
+        "table_1": paper_tables.table_1(cells, published),
+        "table_2": paper_tables.table_2(cells, published),
+        "table_3": paper_tables.table_3(cells, published),
+        "behaviour": paper_tables.behaviour(cells),
+        "learning": paper_tables.learning(cells, runs),
     }
     for name, frame in frames.items():
-        tables.save(frame, captions.caption(name, cells), Path("results/tables") / name)
+        paper_tables.save(frame, captions.caption(name, cells), Path("results/tables") / name)

@@ -3,8 +3,9 @@
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, schemas
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table, write_table
 
 with logged(snakemake.log[0]):
-    runs = [artifacts.read_table(path, schemas.PEERS) for path in snakemake.input]
-    artifacts.write_table(snakemake.output[0], pd.concat(runs, ignore_index=True), schemas.PEERS)
+    runs = [read_table(path, schemas.PEERS) for path in snakemake.input]
+    write_table(snakemake.output[0], pd.concat(runs, ignore_index=True), schemas.PEERS)

@@ -5,11 +5,12 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping import experiment_figures, experiments
+from reacher_shaping.figures import studies
+from reacher_shaping.storage.files import read_studies
 
 given, wildcards = snakemake.input, snakemake.wildcards
 
 with logged(snakemake.log[0]):
-    tables = experiments.read(path for path in given if "/experiments/" in path)[wildcards.experiment]
-    figure = experiment_figures.draw(wildcards.view, tables, pd.read_csv(given.training_logs))
-    experiment_figures.save(figure, Path("figures") / f"{wildcards.experiment}_{wildcards.view}")
+    tables = read_studies(path for path in given if "/experiments/" in path)[wildcards.experiment]
+    figure = studies.draw(wildcards.view, tables, pd.read_csv(given.training_logs))
+    studies.save(figure, Path("figures") / f"{wildcards.experiment}_{wildcards.view}")

@@ -5,27 +5,32 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, further, peer_results, schemas, style, tables
+from reacher_shaping.figures import robustness
+from reacher_shaping.figures.baselines import peer_strip
+from reacher_shaping.figures.style import save
+from reacher_shaping.report import paper_tables
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 given = snakemake.input
 
 with logged(snakemake.log[0]):
-    runs = artifacts.read_table(given.runs, schemas.RUNS)
-    cells = artifacts.read_table(given.cells, schemas.CELLS)
-    published = tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
-    comparisons = artifacts.read_table(given.comparisons, schemas.COMPARISONS)
-    radii = artifacts.read_table(given.radii, schemas.RADII)
-    lengths = artifacts.read_table(given.lengths, schemas.LENGTHS)
+    runs = read_table(given.runs, schemas.RUNS)
+    cells = read_table(given.cells, schemas.CELLS)
+    published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
+    comparisons = read_table(given.comparisons, schemas.COMPARISONS)
+    radii = read_table(given.radii, schemas.RADII)
+    lengths = read_table(given.lengths, schemas.LENGTHS)
     figures = {
-        "seed_strip": further.seed_strip(runs, cells, published),
-        "forest": further.forest(comparisons),
-        "success_by_radius": further.success_by_radius(radii, radius=snakemake.params.radius),
-        "long_episodes": further.long_episodes(lengths, metric="final_distance"),
-        "lottery": further.lottery(artifacts.read_table(given.lottery, schemas.LOTTERY)),
+        "seed_strip": robustness.seed_strip(runs, cells, published),
+        "forest": robustness.forest(comparisons),
+        "success_by_radius": robustness.success_by_radius(radii, radius=snakemake.params.radius),
+        "long_episodes": robustness.long_episodes(lengths, metric="final_distance"),
+        "lottery": robustness.lottery(read_table(given.lottery, schemas.LOTTERY)),
     }
     if given.peers:
-        peers = artifacts.read_table(given.peers[0], schemas.PEERS)
-        controllers = artifacts.read_table(given.controllers, schemas.CONTROLLERS)
-        figures["peers"] = peer_results.peer_strip(peers, runs, cells, controllers)
+        peers = read_table(given.peers[0], schemas.PEERS)
+        controllers = read_table(given.controllers, schemas.CONTROLLERS)
+        figures["peers"] = peer_strip(peers, runs, cells, controllers)
     for name, figure in figures.items():
-        style.save(figure, Path("figures") / name)
+        save(figure, Path("figures") / name)

@@ -3,19 +3,20 @@
 import torch
 from job import logged
 
-from reacher_shaping import artifacts, media
-from reacher_shaping.cell import Environment
-from reacher_shaping.policy import Policy
-from reacher_shaping.provenance import unchanged
+from reacher_shaping.evaluation import video
+from reacher_shaping.settings.cell import Environment
+from reacher_shaping.storage.policy_format import read_policy
+from reacher_shaping.storage.provenance import unchanged
+from reacher_shaping.training.policy import Policy
 
 params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
-    trained = artifacts.read_policy(unchanged(snakemake.input[0]))
+    trained = read_policy(unchanged(snakemake.input[0]))
     first = Policy.from_weights({name: tensor[:1] for name, tensor in trained.weights.items()})
-    episode = media.evaluation_episode(
+    episode = video.evaluation_episode(
         first.act,
         trained.seeds[0],
         mode="stochastic",
@@ -24,6 +25,6 @@ with logged(snakemake.log[0]):
         clip_actions=environment.clip_actions,
         root_seed=params.root_seed,
     )
-    pictures = media.frames(episode, f"{snakemake.wildcards.name}, seed {trained.seeds[0]}")
-    media.write_video(snakemake.output.gif, pictures)
-    media.write_video(snakemake.output.mp4, pictures)
+    pictures = video.frames(episode, f"{snakemake.wildcards.name}, seed {trained.seeds[0]}")
+    video.write_video(snakemake.output.gif, pictures)
+    video.write_video(snakemake.output.mp4, pictures)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping import notebooks
+from reacher_shaping.jobs import notebooks
 
 source, log = Path(snakemake.input.source), Path(snakemake.log[0])
 

@@ -7,10 +7,12 @@ from pathlib import Path
 import torch
 from job import logged
 
-from reacher_shaping import artifacts, schemas, search
-from reacher_shaping.cell import Protocol, Variant
-from reacher_shaping.config import Evaluation, Search
-from reacher_shaping.meter import Meter
+from reacher_shaping.jobs import search
+from reacher_shaping.jobs.progress import Meter
+from reacher_shaping.settings.cell import Protocol, Variant
+from reacher_shaping.settings.study import Evaluation, Search
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table, write_table
 
 params = snakemake.params
 spec = Search.model_validate_json(params.search)
@@ -29,11 +31,11 @@ def measure(values: search.Values) -> search.Values:
 
 with logged(snakemake.log[0]) as say:
     torch.set_num_threads(1)
-    done = artifacts.read_table(kept, schemas.TRIALS).head(spec.trials) if kept.exists() else None
+    done = read_table(kept, schemas.TRIALS).head(spec.trials) if kept.exists() else None
     meter = Meter(spec.trials, spec.seeds * spec.budget, 0 if done is None else len(done), unit="trial")
     for trials in search.trials(spec, measure, done):
-        artifacts.write_table(kept, trials, schemas.TRIALS, sealed=False)
+        write_table(kept, trials, schemas.TRIALS, sealed=False)
         for line in meter.lines(len(trials)):
             say(f"{line}, best return {trials['mean_return'].max():.3f}")
-    found = artifacts.read_table(kept, schemas.TRIALS).head(spec.trials)  # kept: more trials later go on from these
-    artifacts.write_table(snakemake.output[0], found, schemas.TRIALS)
+    found = read_table(kept, schemas.TRIALS).head(spec.trials)  # kept: more trials later go on from these
+    write_table(snakemake.output[0], found, schemas.TRIALS)

@@ -3,22 +3,25 @@
 import pandas as pd
 from job import logged
 
-from reacher_shaping import artifacts, comparisons, curves, experiments, schemas, tables
-from reacher_shaping.provenance import unchanged
+from reacher_shaping.analysis import comparisons, learning_curves, switch_effects
+from reacher_shaping.report import paper_tables
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table, write_table
+from reacher_shaping.storage.provenance import unchanged
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
-    runs = artifacts.read_table(given.runs, schemas.RUNS)
+    runs = read_table(given.runs, schemas.RUNS)
     blocks = zip(params.cells, given.progress, strict=True)
-    parts = [artifacts.read_table(unchanged(path), schemas.PROGRESS).assign(**cell) for cell, path in blocks]
+    parts = [read_table(unchanged(path), schemas.PROGRESS).assign(**cell) for cell, path in blocks]
     progress = pd.concat(parts, ignore_index=True)
-    artifacts.write_table(output.logs, experiments.logs_frame(progress), schemas.LOGS)
-    logged_curves = curves.curve_table(progress, column="logged_return")
-    artifacts.write_table(output.logged, logged_curves, schemas.CURVES)
+    write_table(output.logs, switch_effects.logs_frame(progress), schemas.LOGS)
+    logged_curves = learning_curves.curve_table(progress, column="logged_return")
+    write_table(output.logged, logged_curves, schemas.CURVES)
     metrics = (*comparisons.METRICS, *comparisons.SPEED)
     compared = comparisons.comparison_frame(runs, params.root_seed, metrics)
-    artifacts.write_table(output.comparisons, compared, schemas.COMPARISONS)
-    published = tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
-    correlated = experiments.correlation_frame(runs, published, snakemake.wildcards.experiment, params.root_seed)
-    artifacts.write_table(output.correlation, correlated, schemas.CORRELATION)
+    write_table(output.comparisons, compared, schemas.COMPARISONS)
+    published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
+    correlated = switch_effects.correlation_frame(runs, published, snakemake.wildcards.experiment, params.root_seed)
+    write_table(output.correlation, correlated, schemas.CORRELATION)

@@ -6,9 +6,13 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping import artifacts, jobs, schemas
-from reacher_shaping.cell import Cell
-from reacher_shaping.provenance import Record, reached_files
+from reacher_shaping.jobs import training_job
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.code_hash import reached_files
+from reacher_shaping.storage.files import write_json, write_monitors, write_table
+from reacher_shaping.storage.policy_format import write_policy
+from reacher_shaping.storage.provenance import Record
 
 record = Record()
 params, output = snakemake.params, snakemake.output
@@ -19,15 +23,15 @@ settings = {"cell": cell.settings(), "radius": params.radius}
 
 with logged(snakemake.log[0]) as say:
     checkpoints = Path("results/.checkpoints") / key
-    with jobs.trained_block(
+    with training_job.trained_block(
         cell, params.seeds, radius=params.radius, folder=checkpoints, report=say, record=record
     ) as (state, _):
         weights = state.policy(cell).weights()
-        artifacts.write_policy(output.policy, params.seeds, weights, settings)
-        artifacts.write_table(output.progress, state.progress_frame(), schemas.PROGRESS)
-        artifacts.write_monitors(output.monitor, state.episodes_frame())
+        write_policy(output.policy, params.seeds, weights, settings)
+        write_table(output.progress, state.progress_frame(), schemas.PROGRESS)
+        write_monitors(output.monitor, state.episodes_frame())
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
         steps = state.iteration * cell.protocol.ppo.rollout_steps * len(params.seeds)
         training = record.to_dict(block, reached_files(__file__), files, steps, snakemake.threads)
         who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
-        artifacts.write_json(output.training, {**who, **training})
+        write_json(output.training, {**who, **training})

@@ -5,16 +5,19 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping import artifacts, peers, schemas
-from reacher_shaping.cell import Protocol
-from reacher_shaping.config import Evaluation
-from reacher_shaping.provenance import Record, reached_files
+from reacher_shaping.jobs import sb3_baselines
+from reacher_shaping.settings.cell import Protocol
+from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.code_hash import reached_files
+from reacher_shaping.storage.files import write_json, write_table
+from reacher_shaping.storage.provenance import Record
 
 record = Record()
 params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
 
 with logged(snakemake.log[0]) as say:
-    run = peers.peer_run(
+    run = sb3_baselines.peer_run(
         wildcards.algorithm,
         int(wildcards.seed),
         params.budget,
@@ -23,9 +26,9 @@ with logged(snakemake.log[0]) as say:
         params.root_seed,
         say,
     )
-    artifacts.write_table(output.run, run, schemas.PEERS)
+    write_table(output.run, run, schemas.PEERS)
     path = Path(output.run)
     told = record.to_dict(path.parent, reached_files(__file__), [path], params.budget, snakemake.threads)
     settings = {"protocol": json.loads(params.protocol), "evaluation": json.loads(params.evaluation)}
     who = {"algorithm": wildcards.algorithm, "seeds": [int(wildcards.seed)], "settings": settings}
-    artifacts.write_json(output.manifest, {**who, "code": params.code, **told})
+    write_json(output.manifest, {**who, "code": params.code, **told})

@@ -1,0 +1,1 @@
+"""Episodes and curves in, tables out: runs, cells, comparisons, correlations, claims. No figure, no report."""

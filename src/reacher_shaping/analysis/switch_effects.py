@@ -1,0 +1,131 @@
+"""Tables of the further studies: what a switch between two protocols does, what is logged, ours beside a peer.
+
+All differences are over seeds; a switch is compared on common seeds, which share first weights, resets and noise unless
+the switch itself changes how many are drawn.
+Effects of a switch, each named in the column `effect`:
+
+| effect | difference |
+|---|---|
+| alone | the start with the switch, less the start |
+| last | the end, less the end without the switch: what it adds when all others are turned |
+| interaction | last less alone: 0 if what the switch does depends on no other |
+| all | the end less the start; `switch` is "all" |
+
+Holm's correction is over all effects of one kind and metric, so that each table answers one question per metric.
+"""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+
+from reacher_shaping import stats
+from reacher_shaping.analysis import learning_curves
+from reacher_shaping.analysis.correlation import CORRELATED, correlations, in_table_2
+from reacher_shaping.analysis.runs import KEY
+from reacher_shaping.random_streams import generator
+from reacher_shaping.settings.cell import Protocol
+from reacher_shaping.settings.study import Switches
+
+EFFECT_METRICS = ("success_rate", "final_success_rate", "unit_return", "final_distance")
+
+
+def unit_return(runs: pd.DataFrame, protocols: Mapping[str, Protocol]) -> "pd.Series[float]":
+    """Return each run's mean return at control weight 1, Gymnasium's default, whatever weight it was trained with.
+
+    A protocol of weight 0 charges nothing, so its runs have none (NaN).
+    """
+    weight = runs["protocol"].map({name: protocol.environment.control_weight for name, protocol in protocols.items()})
+    return runs["reward_distance"] + runs["reward_control"] / weight.where(weight > 0)
+
+
+def effects_frame(
+    runs: pd.DataFrame, switches: Switches, protocols: Mapping[str, Protocol], root_seed: int
+) -> pd.DataFrame:
+    """A row per variant, switch, effect and metric.
+
+    Columns: variant, switch, setting (its values at start and end), effect, metric, difference, ci_low, ci_high, p,
+    p_holm, seeds. Cells that are not among `runs` give no row.
+    """
+    runs = runs.assign(unit_return=unit_return(runs, protocols))
+    by_cell = {key: own.set_index("seed") for key, own in runs.groupby(KEY)}
+    rows = []
+    for variant, switch, effect, terms in _contrasts(switches):
+        rest = (variant, switches.budget, 1.0 if variant == "none" else switches.alpha0)
+        keys = {(protocol, *rest): sign for protocol, sign in terms.items()}
+        if not keys.keys() <= by_cell.keys():
+            continue
+        for metric in EFFECT_METRICS:
+            parts = [sign * by_cell[key][metric] for key, sign in keys.items()]
+            values = pd.concat(parts, axis=1, join="inner").sum(axis=1, skipna=False)
+            random = generator(root_seed, variant, switch, effect, metric)
+            found = stats.paired_comparison(values, np.zeros(len(values)), random)
+            named = {"variant": variant, "switch": switch, "setting": _setting(switch, switches, protocols)}
+            rows.append({**named, "effect": effect, "metric": metric} | found._asdict())
+    frame = pd.DataFrame(rows, columns=["variant", "switch", "setting", "effect", "metric", *stats.Comparison._fields])
+    return stats.with_holm(frame.rename(columns={"low": "ci_low", "high": "ci_high"}), ["effect", "metric"])
+
+
+def _contrasts(switches: Switches) -> Iterator[tuple[str, str, str, dict[str, int]]]:
+    """(variant, switch, effect, sign of each protocol) of every effect."""
+    start, end = switches.start, switches.end
+    rows = [("all", "all", {end: 1, start: -1})]
+    for switch in switches.settings:
+        alone, rest = f"{start}_with_{switch}", f"{end}_without_{switch}"
+        rows += [
+            (switch, "alone", {alone: 1, start: -1}),
+            (switch, "last", {end: 1, rest: -1}),
+            (switch, "interaction", {end: 1, rest: -1, alone: -1, start: 1}),
+        ]
+    return ((variant, *row) for variant in switches.variants for row in rows)
+
+
+def _setting(switch: str, switches: Switches, protocols: Mapping[str, Protocol]) -> str:
+    """The settings of a switch with their values, `control weight 0.1 to 1`."""
+    parts = []
+    for path in switches.settings.get(switch, ()):
+        part, _, key = path.partition(".")
+        start, end = (getattr(getattr(protocols[name], part), key) for name in (switches.start, switches.end))
+        values = [f"{value:g}" if isinstance(value, float) else str(value) for value in (start, end)]
+        parts.append(f"{key.replace('_', ' ')} {values[0]} to {values[1]}")
+    return "; ".join(parts) or "every switch"
+
+
+def logs_frame(progress: pd.DataFrame) -> pd.DataFrame:
+    """A row per run on what its protocol's own log shows, from all progress tables with the cell's key.
+
+    Columns: the key, seed, `peak_return, peak_iteration, final_return` of the logged return's moving average (as
+    `learning_curves.measures`), and `action_std` of the last iteration.
+    """
+    rows = []
+    for key, own in progress.sort_values("iteration").groupby([*KEY, "seed"]):
+        found = learning_curves.measures(own["logged_return"].to_numpy())
+        named = dict(zip([*KEY, "seed"], key, strict=True))
+        measured = {name: float(found[name][0]) for name in ("peak_return", "peak_iteration", "final_return")}
+        rows.append(named | measured | {"action_std": float(own["action_std"].iloc[-1])})
+    return pd.DataFrame(rows)
+
+
+def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str, root_seed: int) -> pd.DataFrame:
+    """Correlations over all cells of an experiment, whatever their protocol, in the form of `correlation.csv`.
+
+    Levels: `cells` and `runs` are the paper's main table, so without the appendix's variants and a baseline labelled
+    with another alpha0 than 1; `cells_all` has them too; `seed0`, `seed1`, ...: what a study of that seed would have
+    reported; and `published`, the paper's own table (`published` comes from `paper_tables.published_cells`).
+    """
+    labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
+    kept, theirs = runs[in_table_2(runs) & ~labelled], published[in_table_2(published)]
+    levels = {"cells": _means(kept), "runs": kept, "cells_all": _means(runs), "published": theirs}
+    parts = [correlations(rows, level, generator(root_seed, name, level)) for level, rows in levels.items()]
+    for seed, rows in kept.groupby("seed"):
+        pairs = [(method, x, y) for method in stats.CORRELATIONS for x in CORRELATED for y in CORRELATED]
+        values = [
+            (method, x, y, float(stats.CORRELATIONS[method](*(rows[c].to_numpy(dtype=float) for c in (x, y)))))
+            for method, x, y in pairs
+        ]
+        parts.append(pd.DataFrame(values, columns=["method", "x", "y", "r"]).assign(n=len(rows), level=f"seed{seed}"))
+    return pd.concat(parts, ignore_index=True).assign(protocol=name)
+
+
+def _means(runs: pd.DataFrame) -> pd.DataFrame:
+    return runs.groupby(KEY, as_index=False)[["success_rate", "mean_return"]].mean()

@@ -1,0 +1,1 @@
+"""What a trained policy does: evaluation episodes, reference controllers, videos, the demo."""

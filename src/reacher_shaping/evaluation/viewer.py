@@ -1,0 +1,63 @@
+"""The demo in a window: trained policies in Gymnasium's own Reacher-v5."""
+
+import os
+import sys
+from typing import Any
+
+import numpy as np
+
+from reacher_shaping.evaluation.evaluate import Actor, Mode
+from reacher_shaping.random_streams import Purpose, stream
+from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, draw_reset
+
+
+class NoDisplayError(RuntimeError):
+    """There is no screen to open a window on."""
+
+
+def require_display() -> None:
+    """Raise NoDisplayError where no window can be opened."""
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise NoDisplayError(
+            "no display: DISPLAY is not set, so no window can be opened; record a file instead (--record FILE.gif)"
+        )
+
+
+def play(act: Actor, *, episodes: int, mode: Mode, control_weight: float, root_seed: int, clip_actions: bool) -> float:
+    """Show episodes on the study's evaluation resets, until the last or until the window is closed.
+
+    `act` is an actor of S = 1. Returns the mean return of the episodes shown to their end, NaN if there are none.
+    Raises NoDisplayError.
+    """
+    require_display()
+    import gymnasium  # not above: the other commands do without it
+
+    environment = gymnasium.make("Reacher-v5", render_mode="human", reward_control_weight=control_weight)
+    arm: Any = environment.unwrapped
+    resets, noise = stream(root_seed, Purpose.EVALUATION_RESETS), stream(root_seed, Purpose.EVALUATION_ACTIONS)
+    returns: list[float] = []
+    try:
+        while len(returns) < episodes and not _closed(arm):
+            environment.reset(seed=0)
+            arm.set_state(*draw_reset(resets))
+            observation, total = arm._get_obs(), 0.0
+            draws = noise.standard_normal((EPISODE_STEPS, ACTION_SIZE), dtype=np.float32)
+            for draw in draws:
+                action = act(observation[None, None], draw[None, None] if mode == "stochastic" else None)[0, 0]
+                observation, reward, *_ = environment.step(action.clip(-1, 1) if clip_actions else action)
+                total += float(reward)
+                if _closed(arm):
+                    break
+            else:
+                returns.append(total)
+    finally:
+        environment.close()
+    return float(np.mean(returns)) if returns else float("nan")
+
+
+def _closed(arm: Any) -> bool:
+    """Whether the person has closed the window; Gymnasium would draw into it all the same, and crash."""
+    import glfw
+
+    viewer = arm.mujoco_renderer.viewer
+    return viewer is not None and bool(glfw.window_should_close(viewer.window))

@@ -1,0 +1,1 @@
+"""What the workflow's jobs do around the science: training, checkpoints, progress, searches, notebooks."""

@@ -1,0 +1,73 @@
+"""Run a notebook source to an executed notebook whose bytes depend only on what it shows.
+
+    python -m reacher_shaping.jobs.notebooks SOURCE.py OUT.ipynb [--log FAILED.ipynb] [--NAME VALUE ...]
+
+Each `--NAME VALUE` sets a parameter of the notebook. The notebook runs in the current folder, so paths given
+relative to it stay relative in what the notebook shows.
+"""
+
+import argparse
+import logging
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import jupytext
+import nbformat
+import papermill
+
+from reacher_shaping.storage.files import write_bytes, write_text
+
+# What varies between two executions of the same notebook.
+VOLATILE = ("papermill", "execution", "jupytext", "widgets")
+
+
+def clean(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """The notebook without times and paths of its execution, its cells numbered instead of given random ids."""
+    for key in VOLATILE:
+        notebook.metadata.pop(key, None)
+    # The interpreter's patch version says nothing about the study.
+    notebook.metadata.get("language_info", {}).pop("version", None)
+    for number, cell in enumerate(notebook.cells):
+        cell["id"] = f"cell-{number}"
+        for key in VOLATILE:
+            cell.metadata.pop(key, None)
+    return notebook
+
+
+def execute(source: Path, out: Path, parameters: dict[str, Any], log: Path | None = None) -> None:
+    """Execute the percent-format `source` with `parameters` and write the clean copy to `out`.
+
+    A notebook that fails is kept, with its traceback, at `log`; the exception goes on to the caller.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        prepared, executed = Path(folder) / "prepared.ipynb", Path(folder) / "executed.ipynb"
+        nbformat.write(jupytext.read(source), prepared)  # type: ignore[no-untyped-call]
+        try:
+            papermill.execute_notebook(
+                prepared, executed, parameters, log_output=False, progress_bar=False, cwd=Path.cwd()
+            )
+        finally:
+            if log is not None and executed.exists():
+                write_bytes(log, executed.read_bytes())
+        notebook = clean(nbformat.read(executed, as_version=4))  # type: ignore[no-untyped-call]
+    write_text(out, nbformat.writes(notebook) + "\n")  # type: ignore[no-untyped-call]
+
+
+def main(arguments: list[str]) -> None:
+    """Command line: source, output, and the notebook's parameters as `--name value`."""
+    parser = argparse.ArgumentParser(description="Execute a notebook source.")
+    parser.add_argument("source", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--log", type=Path)
+    known, rest = parser.parse_known_args(arguments)
+    if len(rest) % 2 or not all(name.startswith("--") for name in rest[::2]):
+        parser.error(f"parameters come as --name value, got {' '.join(rest)}")
+    parameters = {name[2:]: value for name, value in zip(rest[::2], rest[1::2], strict=True)}
+    logging.getLogger("papermill").setLevel(logging.ERROR)
+    execute(known.source, known.out, parameters, known.log)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,62 @@
+"""What a training job does around the training: lock its block, go on from a checkpoint, keep one, show progress."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import torch
+
+from reacher_shaping.jobs.checkpoint import load_checkpoint, save_checkpoint
+from reacher_shaping.jobs.progress import Meter
+from reacher_shaping.settings.cell import Cell
+from reacher_shaping.storage.files import exclusive
+from reacher_shaping.storage.provenance import Record
+from reacher_shaping.training.train import TrainState, train
+
+SECONDS_PER_CHECKPOINT = 30.0
+
+
+@contextmanager
+def trained_block(
+    cell: Cell,
+    seeds: Sequence[int],
+    *,
+    radius: float,
+    folder: Path,
+    report: Callable[[str], None],
+    record: Record | None = None,
+    seconds_per_checkpoint: float = SECONDS_PER_CHECKPOINT,
+) -> Iterator[tuple[TrainState, int]]:
+    """Train a block to its end, from the checkpoint in `folder` if there is one, and give its final state.
+
+    Beside it stands the number of iterations that were done here, the rest having been done before the checkpoint.
+
+    Meanwhile no other process trains with the same folder; the checkpoint is removed once the caller has saved the
+    result, that is when the context ends without an exception. `report` gets a line of text now and then, and `record`
+    the time that went into the checkpoint before.
+    """
+    record = record or Record()
+    torch.set_num_threads(1)  # a job is one thread, on any machine: the number of threads may change the last bits
+    checkpoint = folder / "checkpoint.pt"
+    with exclusive(folder.with_suffix(".lock")):
+        state, seconds = load_checkpoint(checkpoint) if checkpoint.exists() else (None, (0.0, 0.0))
+        start = state.iteration if state else 0
+        if start:
+            record.add(*seconds)
+            report(f"goes on from iteration {start} of {cell.iterations}")
+        meter = Meter(cell.iterations, len(seeds) * cell.protocol.ppo.rollout_steps, start)
+        saved = time.monotonic()
+        for current in train(cell, seeds, radius=radius, state=state):
+            state = current
+            for line in meter.lines(state.iteration):
+                report(line)
+            if time.monotonic() - saved > seconds_per_checkpoint:
+                save_checkpoint(checkpoint, state, record.seconds())
+                saved = time.monotonic()
+        assert state is not None, "a cell has at least one iteration"
+        yield state, state.iteration - start
+        shutil.rmtree(folder, ignore_errors=True)  # a process killed while it wrote has left a temporary file there

@@ -1,0 +1,1 @@
+"""Tables in, words and pages out. No statistic is computed here."""

@@ -1,0 +1,161 @@
+"""How much a few seeds can show, in tables and sentences: power, variance, the lottery of one seed per cell.
+
+Every number comes from the study's tables; here they are only counted, rounded and put into words.
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reacher_shaping.analysis import single_seed_studies
+from reacher_shaping.labels import budget_label, cell_order, number, of_protocol, setting_label, variant_label
+from reacher_shaping.report.text_tables import Grid
+
+POWER = 0.8  # chance to see an effect that counts as enough, as `power.parquet` has it
+MOST = 10_000  # seeds up to which `stats.seeds_needed` looks
+CELL_HEADINGS = ["Variant", "Budget (steps)", "α₀"]
+QUANTITIES = {
+    "best_success": "Success rate of the best cell",
+    "ratio": "Best cell over none at the longer budget",
+    "r_alpha_return": "r(α₀, return)",
+    "r_success_return": "r(success, return)",
+    "r_success_budget": "r(success, budget)",
+}
+
+
+def power_grid(power: pd.DataFrame, protocol: str | None = None) -> Grid:
+    """A row per shaped cell of the table of powers: published gain, our deviation, power, and the seeds it takes."""
+    headings = [
+        *CELL_HEADINGS, "Published gain over none", "Deviation of our paired differences", "Seeds", "Power with these",
+        "Power with 3", f"Seeds for a power of {POWER:g}",
+    ]  # fmt: skip
+    rows = [
+        [
+            *_cell(row),
+            _text(row["published_gain"]),
+            _text(row["deviation"]),
+            f"{row['seeds']:.0f}",
+            _text(row["power"], 2),
+            _text(row["power_3"], 2),
+            _needed(row),
+        ]
+        for row in _sorted(of_protocol(power, protocol))
+    ]
+    return Grid(headings, rows)
+
+
+def power_sentence(power: pd.DataFrame, protocol: str | None = None) -> str:
+    """What the table of powers says: in how many cells the published gain could be told from chance."""
+    known = of_protocol(power, protocol).dropna(subset="deviation")
+    if known.empty:
+        return "How many seeds the published gains take cannot be said: no cell has two seeds and a published gain."
+    seeds = sorted(known["seeds"].unique())
+    ours = f"{seeds[0]:.0f}" if len(seeds) == 1 else f"{seeds[0]:.0f} to {seeds[-1]:.0f}"
+    middle = float(np.median(known["seeds_needed"].fillna(np.inf)))
+    needed = f"{np.ceil(middle):,.0f}" if np.isfinite(middle) else f"more than {MOST:,}"
+    enough, three = ((known[name] >= POWER).sum() for name in ("power", "power_3"))
+    return (
+        f"If the published gains over none were true, a paired test with the {ours} seeds of this study would have a "
+        f"power of {POWER:g} or more in {enough} of {len(known)} cells, and with 3 seeds in {three}; the median cell "
+        f"takes {needed} seeds."
+    )
+
+
+def _needed(row: dict[Any, Any]) -> str:
+    if not np.isfinite(row["deviation"]):
+        return _text(np.nan)
+    return f"{row['seeds_needed']:,.0f}" if np.isfinite(row["seeds_needed"]) else f"over {MOST:,}"
+
+
+def variance_grid(variance: pd.DataFrame, protocol: str | None = None) -> Grid:
+    """A row per cell: standard deviations of the success rate from seeds and from evaluation, and the seeds' share."""
+    headings = [
+        *CELL_HEADINGS,
+        "Seeds",
+        "Deviation from seeds",
+        "Deviation from evaluation",
+        "Seeds' share of variance",
+    ]
+    rows = [
+        [
+            *_cell(row),
+            f"{row['seeds']:.0f}",
+            _text(np.sqrt(row["seed_variance"])),
+            _text(np.sqrt(row["evaluation_variance"])),
+            _percent(_share(row)),
+        ]
+        for row in _sorted(of_protocol(variance, protocol))
+    ]
+    return Grid(headings, rows)
+
+
+def variance_sentence(variance: pd.DataFrame, protocol: str | None = None) -> str:
+    """What the table of variances says: would more seeds or more evaluation episodes narrow the intervals?"""
+    shares = np.array([_share(row) for row in _sorted(of_protocol(variance, protocol))], dtype=float)
+    shares = shares[np.isfinite(shares)]
+    if not shares.size:
+        return "One seed per cell cannot tell the differences between seeds from the noise of the evaluation."
+    middle = float(np.median(shares))
+    more, other = ("seeds", "evaluation episodes") if middle > 0.5 else ("evaluation episodes", "seeds")
+    return (
+        f"In the median cell {_percent(middle)} of the variance of the success rate over runs is between seeds "
+        f"({_percent(shares.min())} to {_percent(shares.max())}) and the rest is noise of the evaluation: more {more}, "
+        f"rather than more {other}, would narrow the intervals."
+    )
+
+
+def _share(row: dict[Any, Any]) -> float:
+    total = row["seed_variance"] + row["evaluation_variance"]
+    return float(row["seed_variance"] / total) if total > 0 else float("nan")
+
+
+def winners_grid(winners: pd.DataFrame) -> Grid:
+    """How often each cell is the best of a study with one seed per cell, most often first."""
+    rows = [[*_cell(row), _percent(row["share"], 1)] for row in winners.to_dict("records")]
+    return Grid([*CELL_HEADINGS, "Best cell in"], rows)
+
+
+def winners_sentence(winners: pd.DataFrame) -> str:
+    """Which cell would win most often, and how far that is from always."""
+    if winners.empty:
+        return "The study lacks cells that the lottery takes."
+    first = winners.sort_values("share", ascending=False).iloc[0]
+    name = f"{variant_label(str(first['variant']))} ({setting_label(int(first['budget']), float(first['alpha0']))})"
+    return (
+        f"With one seed per cell, {len(winners)} cells could have come out best, the most frequent of them, {name}, "
+        f"in {_percent(first['share'], 1)} of such studies."
+    )
+
+
+def spread_grid(spread: pd.DataFrame, published: pd.DataFrame) -> Grid:
+    """Quantiles of what studies with one seed per cell report, the published value beside.
+
+    `published` comes from `paper_tables.published_cells`; it is itself such a study.
+    """
+    study = single_seed_studies.single_seed_studies(published.assign(seed=0), np.random.default_rng(0), studies=1)
+    theirs = study.iloc[0].to_dict() if len(study) else {}
+    levels = [str(name) for name in spread if name != "quantity"]
+    rows = []
+    for row in spread.to_dict("records"):
+        name = row["quantity"]
+        values = [row[level] for level in levels] + [theirs.get(name, np.nan)]
+        rows.append([QUANTITIES.get(name, name), *(_text(value, 2) for value in values)])
+    headings = [f"{level.removeprefix('q').lstrip('0')} %" for level in levels]
+    return Grid(["Quantity", *headings, "published"], rows)
+
+
+def _sorted(frame: pd.DataFrame) -> list[dict[Any, Any]]:
+    return sorted(frame.to_dict("records"), key=cell_order)
+
+
+def _cell(row: dict[Any, Any]) -> list[str]:
+    return [variant_label(str(row["variant"])), budget_label(int(row["budget"])), f"{row['alpha0']:g}"]
+
+
+def _text(value: float, digits: int = 3) -> str:
+    return number(value, digits) if pd.notna(value) else "\N{EN DASH}"
+
+
+def _percent(value: float, digits: int = 0) -> str:
+    return f"{_text(100 * value, digits)}\N{NO-BREAK SPACE}%" if pd.notna(value) else "\N{EN DASH}"

@@ -1,0 +1,187 @@
+"""The tables of the further studies, as the report shows them: a measure with its interval in each entry."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
+from reacher_shaping.labels import budget_label, cell_order, number, of_protocol, setting_label, variant_label
+from reacher_shaping.report import paper_tables
+from reacher_shaping.report.text_tables import Grid, of_table
+
+METRICS = ("success_rate", "unit_return", "final_distance")
+SHAPING = ("success_rate", "final_success_rate", "mean_return", "final_distance", "area_under_curve")
+NAMES = {
+    "success_rate": "Success, any step",
+    "final_success_rate": "Success, last step",
+    "mean_return": "Mean return",
+    "final_distance": "Distance at the last step (mm)",
+    "deterministic_success_rate": "Success, any step, mean action",
+    "deterministic_final_success_rate": "Success, last step, mean action",
+    "deterministic_mean_return": "Mean return, mean action",
+    "deterministic_final_distance": "Distance at the last step, mean action (mm)",
+    "unit_return": "Mean return at control weight 1",
+    "area_under_curve": "Mean return while training",
+}
+PAIRS = {
+    ("alpha0", "mean_return"): "r(α₀, return)",
+    ("success_rate", "mean_return"): "r(success, return)",
+    ("success_rate", "budget"): "r(success, budget)",
+}
+LOGGED = {"peak_iteration": 0, "peak_return": 1, "final_return": 1}
+DASH = "\N{EN DASH}"
+
+
+def decimals(metric: str) -> tuple[int, float]:
+    """Decimals of a measure, and the factor it is shown with: distances in mm."""
+    return (
+        (1, 1000.0) if metric.endswith("distance") else (2, 1.0) if metric.endswith(("return", "curve")) else (3, 1.0)
+    )
+
+
+def interval(row: Mapping[Any, Any], name: str, low: str, high: str, digits: int, factor: float = 1.0) -> str:
+    """A number with its limits, from three columns of a row."""
+    if pd.isna(row[name]):
+        return DASH
+    text = number(factor * row[name], digits)
+    if pd.isna(row[low]):
+        return text
+    return f"{text} [{number(factor * row[low], digits)}, {number(factor * row[high], digits)}]"
+
+
+def p_value(value: float) -> str:
+    """A p value as it is printed."""
+    return DASH if pd.isna(value) else "< 0.001" if value < 0.001 else number(value, 3)
+
+
+def effects(table: pd.DataFrame) -> Grid:
+    """A row per switch, variant and kind of effect; for each measure the difference and its corrected p."""
+    rows = []
+    kinds = {**KINDS, "interaction": "last less alone"}
+    for (switch, variant, kind), own in table.groupby(["switch", "variant", "effect"], sort=False):
+        by_metric = {str(row["metric"]): row for row in own.to_dict("records")}
+        first = next(iter(by_metric.values()))
+        entries = [switch_label(first), variant_label(str(variant)), kinds[str(kind)]]
+        for metric in METRICS:
+            row, (digits, factor) = by_metric[metric], decimals(metric)
+            entries += [interval(row, "difference", "ci_low", "ci_high", digits, factor), p_value(row["p_holm"])]
+        rows.append((list(dict.fromkeys(table["switch"])).index(switch), entries))
+    headings = ["Switch", "Variant", "Effect"]
+    headings += [text for metric in METRICS for text in (NAMES[metric], "p")]
+    return Grid(headings, [entries for _, entries in sorted(rows, key=lambda row: row[0])], frozenset({0, 1, 2}))
+
+
+def correlation(table: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:
+    """A row per pair of the paper: published, over the same cells and over all of the study, single seeds.
+
+    The last column is the main study's, whose start weights are what they say.
+    """
+    rows = []
+    for (x, y), name in PAIRS.items():
+        own = table[(table["method"] == "pearson") & (table["x"] == x) & (table["y"] == y)]
+        by_level = {row["level"]: row for row in own.to_dict("records")}
+        seeds = own[own["level"].str.startswith("seed")]["r"].dropna()
+        span = f"{number(seeds.min(), 2)} to {number(seeds.max(), 2)}" if len(seeds) else DASH
+        texts = [
+            interval(by_level[level], "r", "ci_low", "ci_high", 2) if level in by_level else DASH
+            for level in ("published", "cells", "cells_all")
+        ]
+        rows.append([name, *texts, span, _main_correlation(main, x, y)])
+    headings = ["", "Published", "Over the same cells", "over all of them", "One seed a cell, range"]
+    return Grid([*headings, "The text's protocol, true α₀"], rows)
+
+
+def _main_correlation(main: pd.DataFrame | None, x: str, y: str) -> str:
+    if main is None:
+        return DASH
+    ours = of_protocol(main, None)
+    ours = ours[(ours["method"] == "pearson") & (ours["level"] == "cells") & (ours["x"] == x) & (ours["y"] == y)]
+    return interval(ours.iloc[0].to_dict(), "r", "ci_low", "ci_high", 2) if len(ours) else DASH
+
+
+def beside(cells: pd.DataFrame, published: pd.DataFrame) -> Grid:
+    """A row per published run: its success and return, and ours of the cell of the same label."""
+    rows = []
+    joined = published.merge(cells, on=paper_tables.CELL, suffixes=("_published", ""))
+    for row in sorted(joined.to_dict("records"), key=cell_order):
+        texts = [str(row["run"]), variant_label(row["variant"]), setting_label(int(row["budget"]), row["alpha0"])]
+        for metric in ("success_rate", "mean_return"):
+            digits, factor = decimals(metric)
+            texts.append(number(factor * row[f"{metric}_published"], digits))
+            texts.append(interval(row, metric, f"{metric}_low", f"{metric}_high", digits, factor))
+        rows.append(texts)
+    headings = ["Published run", "Variant", "Budget, label"]
+    headings += [text for metric in ("success_rate", "mean_return") for text in (f"{NAMES[metric]}, published", "ours")]
+    return Grid(headings, rows, frozenset({0, 1, 2}))
+
+
+def logs(table: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
+    """A row per cell, and a row per published log of one of them."""
+
+    def span(values: "pd.Series[float]", digits: int) -> str:
+        low, mean, high = (number(value, digits) for value in (values.min(), values.mean(), values.max()))
+        return f"{mean} [{low}, {high}]"
+
+    rows = []
+    groups = table.groupby(["protocol", "variant", "budget", "alpha0"], sort=False)
+    ordered = sorted(groups, key=lambda group: (group[1]["protocol"].iloc[0], cell_order(group[1].iloc[0].to_dict())))
+    for _, own in ordered:
+        cell = own.iloc[0].to_dict()
+        texts = [span(own[name], digits) for name, digits in LOGGED.items()]
+        texts.append(span(own["action_std"], 2))
+        setting = setting_label(int(cell["budget"]), cell["alpha0"])
+        rows.append([protocol_label(cell["protocol"]), variant_label(cell["variant"]), setting, *texts])
+    keys = ["protocol", "variant", "budget"]
+    cells = set(table.loc[table["alpha0"] == 1, keys].itertuples(index=False, name=None))
+    for run in training_logs.to_dict("records"):
+        if tuple(run[name] for name in keys) not in cells:
+            continue
+        texts = [number(run[name], digits) for name, digits in LOGGED.items()]
+        setting = budget_label(int(run["budget"]))
+        std = f"{number(run['std_1'], 2)} and {number(run['std_2'], 2)}"
+        rows.append([f"published, {run['run']}", variant_label(str(run["variant"])), setting, *texts, std])
+    headings = ["Protocol", "Variant", "Budget, label", "Iteration of the peak", "Peak", "End", "Deviation at the end"]
+    return Grid(headings, rows, frozenset({0, 1, 2}))
+
+
+def agreement(table: pd.DataFrame) -> Grid:
+    """A row per measure: ours, theirs, the difference with its interval, p."""
+    rows = []
+    for row in table.to_dict("records"):
+        digits, factor = decimals(row["metric"])
+        means = [number(factor * row[name], digits) for name in ("ours", "theirs")]
+        difference = interval(row, "difference", "ci_low", "ci_high", digits, factor)
+        rows.append([NAMES[row["metric"]], *means, difference, p_value(row["p"]), p_value(row["p_holm"])])
+    return Grid(["Measure", "Ours", "Stable-Baselines3", "Difference", "p (Welch)", "p (Holm)"], rows)
+
+
+def shaping(shaped: pd.DataFrame) -> Grid:
+    """A row per shaped cell: its paired difference to `none` in each measure, with the corrected p."""
+    rows = []
+    ordered = sorted(shaped.to_dict("records"), key=lambda row: (row["protocol"], cell_order(row)))
+    by_cell: dict[tuple[Any, ...], dict[str, dict[Any, Any]]] = {}
+    for row in ordered:
+        key = (row["protocol"], row["variant"], row["budget"], row["alpha0"])
+        by_cell.setdefault(key, {})[row["metric"]] = row
+    for (protocol, variant, budget, alpha0), own in by_cell.items():
+        entries = [protocol_label(protocol), variant_label(variant), setting_label(int(budget), alpha0)]
+        for metric in SHAPING:
+            digits, factor = decimals(metric)
+            entries.append(interval(own[metric], "difference", "ci_low", "ci_high", digits, factor))
+            entries.append(p_value(own[metric]["p_holm"]))
+        rows.append(entries)
+    headings = ["Protocol", "Variant", "Budget, α₀", *(text for name in SHAPING for text in (NAMES[name], "p"))]
+    return Grid(headings, rows, frozenset({0, 1, 2}))
+
+
+def cells(table: pd.DataFrame) -> Grid:
+    """Every cell with the measures of the study's tables, protocol by protocol."""
+    order = list(dict.fromkeys(table["protocol"]))
+    rows = sorted(table.to_dict("records"), key=lambda row: (order.index(row["protocol"]), *cell_order(row)))
+    frame = pd.DataFrame(rows, columns=table.columns)
+    frame["policy"] = [protocol_label(name) for name in frame["protocol"]]
+    keep = ["policy", "variant", "budget", "alpha0", "seeds", "diverged"]
+    keep += [f"{name}{end}" for name in paper_tables.MEASURED for end in ("", "_low", "_high")]
+    grid = of_table(frame[keep])
+    return Grid(["Protocol", *grid.headings[1:]], grid.rows, grid.texts)

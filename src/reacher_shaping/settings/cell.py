@@ -1,0 +1,183 @@
+"""One cell: everything that determines the training of its runs, and what each setting may be.
+
+Unknown keys and impossible values are refused. The module imports neither torch nor numpy, so that Snakemake builds its
+graph of jobs fast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from reacher_shaping.settings.base import Count, Fraction, Name, NonNegative, Positive, Seed, Settings, plain
+
+EPISODE_STEPS = 50
+"""Environment steps of an episode of Reacher-v5; the simulation's own constant, which would load MuJoCo."""
+
+
+class Environment(Settings):
+    """What surrounds Reacher-v5: the weight of the control cost, and whether actions are clipped to [-1, 1]."""
+
+    control_weight: NonNegative = 0.1
+    clip_actions: bool = False
+
+
+class PPO(Settings):
+    """Proximal policy optimisation (Schulman et al. 2017); the defaults are the paper's, as in config.yaml."""
+
+    learning_rate: Positive = 3e-4
+    learning_rate_schedule: Literal["constant", "linear"] = "constant"
+    discount: Annotated[float, Field(gt=0, le=1)] = 0.99
+    gae_lambda: Fraction = 0.95
+    clip_range: Positive = 0.2
+    ratio_pairs: Literal["sample", "minibatch"] = "sample"
+    advantage_normalisation: Literal["rollout", "minibatch"] = "rollout"
+    minibatch_size: Count = 64
+    rollout_steps: Annotated[int, Field(ge=2, le=10**6)] = 2048
+    epochs: Annotated[int, Field(ge=1, le=1000)] = 10
+    value_coefficient: NonNegative = 0.5
+    entropy_coefficient: NonNegative = 0.01
+    max_gradient_norm: Positive = 0.5
+    adam_epsilon: Positive = 1e-8
+    hidden_units: Annotated[int, Field(ge=1, le=4096)] = 64
+    networks: Literal["shared", "separate"] = "shared"
+    initialisation: Literal["default", "orthogonal"] = "default"
+    initial_log_std: float = 0.0
+
+    @property
+    def towers(self) -> int:
+        """Trunks of a network: one for policy and value together, or one each."""
+        return 2 if self.networks == "separate" else 1
+
+    @model_validator(mode="after")
+    def _minibatches_fill_the_rollout(self) -> Self:
+        if self.rollout_steps % self.minibatch_size:
+            raise ValueError(f"minibatch_size = {self.minibatch_size} must divide rollout_steps = {self.rollout_steps}")
+        if self.advantage_normalisation == "minibatch" and self.minibatch_size < 2:
+            raise ValueError(
+                f"minibatch_size = {self.minibatch_size} has no deviation to normalise by; allowed: >= 2, or "
+                "advantage_normalisation = 'rollout'"
+            )
+        return self
+
+
+class Shaping(Settings):
+    """How the shaping reward is formed, and what holds at the last step of an episode."""
+
+    form: Literal["paper", "dynamic"] = "paper"
+    episode_end: Literal["terminal", "bootstrap"] = "terminal"
+    terminal_potential: Literal["keep", "zero"] = "keep"
+    decay_potential: Literal["variant", "l2sq"] = "variant"
+    alpha0: Literal["weight", "label"] = "weight"
+
+
+class Log(Settings):
+    """What the protocol's own training log shows, in the column `logged_return`; nothing learns from it."""
+
+    episode_return: Literal["unshaped", "released"] = "unshaped"
+
+
+class Protocol(Settings):
+    """A named, complete set of environment and algorithm choices."""
+
+    name: Name
+    environment: Environment = Environment()
+    ppo: PPO = PPO()
+    shaping: Shaping = Shaping()
+    log: Log = Log()
+
+    @model_validator(mode="after")
+    def _there_is_something_to_log(self) -> Self:
+        if self.log.episode_return == "released" and self.ppo.rollout_steps < EPISODE_STEPS:
+            raise ValueError(
+                f"log.episode_return = 'released' needs a whole episode in a rollout; ppo.rollout_steps = "
+                f"{self.ppo.rollout_steps}; allowed: >= {EPISODE_STEPS}"
+            )
+        return self
+
+
+class Variant(Settings):
+    """One shaping rule: a potential and the schedule of its weight; `horizon` is in environment steps."""
+
+    name: Name
+    potential: Literal["none", "l2", "l2sq"]
+    schedule: Literal["constant", "linear"] = "constant"
+    horizon: Count | None = None
+
+    @model_validator(mode="after")
+    def _schedule_is_complete(self) -> Self:
+        if self.schedule == "linear" and self.horizon is None:
+            raise ValueError("horizon is missing; schedule = 'linear' needs a number of environment steps >= 1")
+        if self.schedule == "constant" and self.horizon is not None:
+            raise ValueError(f"horizon = {self.horizon} has no meaning with schedule = 'constant'; leave it out")
+        if (self.name == "none") != (self.potential == "none"):
+            raise ValueError(
+                f"potential = {self.potential!r} does not go with the name {self.name!r}: "
+                "the baseline alone is called none and has the potential none"
+            )
+        if self.potential == "none" and self.schedule != "constant":
+            raise ValueError(
+                f"schedule = {self.schedule!r} has no meaning with potential = 'none'; allowed: 'constant'"
+            )
+        return self
+
+
+class Cell(Settings):
+    """Protocol x variant x budget x alpha0, plus the root of its random streams: all that determines its training.
+
+    `budget` is in environment steps; `alpha0` is the shaping weight at t = 0.
+    """
+
+    protocol: Protocol
+    variant: Variant
+    budget: Count
+    alpha0: Positive = 1.0
+    root_seed: Seed = 0
+
+    @model_validator(mode="after")
+    def _budget_and_alpha0_are_possible(self) -> Self:
+        if self.budget < self.protocol.ppo.rollout_steps:
+            raise ValueError(
+                f"budget = {self.budget} is below one rollout; allowed: >= {self.protocol.ppo.rollout_steps}"
+            )
+        if self.variant.potential == "none" and self.alpha0 != 1 and self.protocol.shaping.alpha0 == "weight":
+            raise ValueError(f"alpha0 = {self.alpha0} has no meaning with variant '{self.variant.name}'; allowed: 1")
+        return self
+
+    @property
+    def folder(self) -> str:
+        """Relative folder of the cell's files, e.g. `paper/l2/500000/alpha0.5`."""
+        return f"{self.protocol.name}/{self.variant.name}/{self.budget}/alpha{plain(self.alpha0)}"
+
+    @property
+    def name(self) -> str:
+        """The folder as one word, e.g. `paper-l2-500000-alpha0.5`: the cell's name in lists and file names."""
+        return self.folder.replace("/", "-")
+
+    @property
+    def iterations(self) -> int:
+        """Rollouts of the run: the budget rounded up to whole rollouts, ceil(budget / rollout_steps)."""
+        return -(-self.budget // self.protocol.ppo.rollout_steps)
+
+    @property
+    def key(self) -> dict[str, str | int | float]:
+        """The columns that name the cell in every study-wide table."""
+        return {
+            "protocol": self.protocol.name,
+            "variant": self.variant.name,
+            "budget": self.budget,
+            "alpha0": self.alpha0,
+        }
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that determines the cell's training, as plain JSON-able values with sorted keys."""
+        settings: dict[str, Any] = _sorted(self.model_dump(mode="json"))
+        return settings
+
+
+def _sorted(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    return value

@@ -1,0 +1,1 @@
+"""Files: how they are written and read, what is in them, and where they come from."""

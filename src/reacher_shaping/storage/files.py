@@ -1,0 +1,234 @@
+"""The only reader and writer of the study's files.
+
+Every file is written to a temporary name beside its target, flushed to disk and renamed, so a reader never meets half
+a file. A table's schema (`schemas`) is checked when it is written and again when it is read. Equal content gives equal
+bytes; what varies from run to run (times, machine) is in the manifests alone.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from reacher_shaping.storage.schemas import INTEGER, STUDY_TABLES, Table
+
+if TYPE_CHECKING:
+    pass
+
+SECONDS_PER_STEP = 0.02  # simulated time of one environment step: two MuJoCo steps of 0.01 s
+
+
+class ArtifactError(RuntimeError):
+    """A file is missing, damaged or not what its name says; the message names it and how to repair it."""
+
+    def __init__(self, path: Path | str, problem: str, repair: str = "delete it and run snakemake again"):
+        super().__init__(f"{path}: {' '.join(problem.split())}; {repair}")
+
+
+def require_replaceable(path: Path | str) -> None:
+    """Raise ArtifactError if something other than a file is at `path`: a folder, or a device such as /dev/null."""
+    path = Path(path)
+    if path.exists() and not path.is_file():
+        raise ArtifactError(path, "is no file", "give the path of a file")
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """Give a temporary path beside `path`; put what was written there in place of `path` if nothing was raised."""
+    path = Path(path)
+    require_replaceable(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        with temporary.open("rb+") as written:
+            os.fsync(written.fileno())
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path | str, content: bytes) -> None:
+    """Write a file atomically."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_text(path: Path | str, content: str) -> None:
+    """Write a UTF-8 text file atomically."""
+    write_bytes(path, content.encode())
+
+
+def sha256(path: Path | str) -> str:
+    """The checksum of a file, or of a folder's file names and contents, as hexadecimal text."""
+    path = Path(path)
+    if path.is_dir():
+        parts = [f"{part.relative_to(path)} {sha256(part)}\n" for part in sorted(path.rglob("*")) if part.is_file()]
+        return hashlib.sha256("".join(parts).encode()).hexdigest()
+    try:
+        with path.open("rb") as content:
+            return hashlib.file_digest(content, "sha256").hexdigest()
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror})") from None
+
+
+def write_json(path: Path | str, content: Mapping[str, Any]) -> None:
+    """Write a mapping as JSON with sorted keys."""
+    write_text(path, json.dumps(content, indent=2, sort_keys=True) + "\n")
+
+
+def read_json(path: Path | str) -> dict[str, Any]:
+    """Read a mapping. Raises ArtifactError."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise ArtifactError(path, f"is no JSON ({error})") from None
+    if not isinstance(content, dict):
+        raise ArtifactError(path, "is no JSON mapping")
+    return content
+
+
+def seal(path: Path | str) -> None:
+    """Keep the checksum of a file that was just written, in a hidden folder beside it."""
+    write_text(_seal_of(Path(path)), sha256(path) + "\n")
+
+
+def check_seal(path: Path | str) -> None:
+    """Raise ArtifactError if a file is not as it was when it was sealed; one that never was passes."""
+    kept = _seal_of(Path(path))
+    if kept.exists() and kept.read_text(encoding="utf-8", errors="replace").strip() != sha256(path):
+        raise ArtifactError(path, "has changed since it was written")
+
+
+def _seal_of(path: Path) -> Path:
+    return path.parent / ".checksums" / path.name
+
+
+def write_table(path: Path | str, frame: pd.DataFrame, table: Table, *, sealed: bool = True) -> None:
+    """Write a table as parquet or CSV, by the path's suffix, and seal it unless told otherwise.
+
+    Raises ValueError where it does not fit its schema.
+    """
+    path = Path(path)
+    arrow = _to_arrow(frame, table, path)
+    if path.suffix == ".csv":
+        write_text(path, arrow.to_pandas(types_mapper=_nullable).to_csv(index=False, lineterminator="\n"))
+    else:
+        with replacing(path) as temporary:
+            pq.write_table(arrow, temporary, compression="zstd", write_page_checksum=True)
+    if sealed:
+        seal(path)
+
+
+def read_table(path: Path | str, table: Table) -> pd.DataFrame:
+    """Read a table; missing values, also of integers, come as NaN. Raises ArtifactError."""
+    path = Path(path)
+    check_seal(path)
+    try:
+        if path.suffix == ".csv":
+            frame = pd.read_csv(path, keep_default_na=False, na_values=[""])
+            arrow = _to_arrow(frame, table, path)
+        else:
+            arrow = pq.read_table(path, page_checksum_verification=True)
+            if not arrow.schema.equals(table.schema(arrow.column_names)):
+                raise ValueError("a column has another type")
+        content: pd.DataFrame = arrow.to_pandas()
+        return content
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror or error})") from None
+    except (ValueError, pa.ArrowException) as error:
+        raise ArtifactError(path, f"is not the expected table ({error})") from None
+
+
+def write_sealed(path: Path | str, content: bytes) -> None:
+    """Write a file that tells whether it is as it was written: its checksum (SHA-256, 32 bytes) comes first."""
+    write_bytes(path, hashlib.sha256(content).digest() + content)
+
+
+def read_sealed(path: Path | str) -> bytes:
+    """Return the content of a file of `write_sealed`. Raises ArtifactError."""
+    try:
+        stored = Path(path).read_bytes()
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be read ({error.strerror})") from None
+    if hashlib.sha256(stored[32:]).digest() != stored[:32]:
+        raise ArtifactError(path, "is damaged: its checksum does not fit")
+    return stored[32:]
+
+
+def write_monitors(folder: Path | str, episodes: pd.DataFrame) -> None:
+    """Write one `<seed>.monitor.csv` per run, as Stable-Baselines3's Monitor does: episode return, length and time.
+
+    episodes: a row per training episode, in order, columns `seed, episode_return, episode_length, env_steps`
+    (`env_steps`: environment steps of the run up to the episode's end). The time column is simulated seconds, so
+    that equal runs give equal files.
+    """
+    header = json.dumps({"t_start": 0.0, "env_id": "Reacher-v5"})
+    for seed, run in episodes.groupby("seed"):
+        rows = zip(run["episode_return"], run["episode_length"], run["env_steps"], strict=True)
+        lines = [f"{value:.6f},{length:.0f},{steps * SECONDS_PER_STEP:.2f}" for value, length, steps in rows]
+        write_text(Path(folder) / f"{seed}.monitor.csv", "\n".join([f"#{header}", "r,l,t", *lines, ""]))
+
+
+def read_studies(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
+    """The tables of further studies by study and name, from their files. Raises ArtifactError."""
+    found: dict[str, dict[str, pd.DataFrame]] = {}
+    for path in map(Path, paths):
+        found.setdefault(path.parent.name, {})[path.stem] = read_table(path, STUDY_TABLES[path.stem])
+    return found
+
+
+@contextmanager
+def exclusive(path: Path | str) -> Iterator[None]:
+    """Hold the lock file `path`, waiting for another process that has it; it is free again when its holder dies."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    while True:
+        with path.open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists() or not os.path.samestat(path.stat(), os.fstat(lock.fileno())):
+                continue  # its holder has removed it while we waited
+            try:
+                yield
+            finally:
+                path.unlink()
+            return
+
+
+def _to_arrow(frame: pd.DataFrame, table: Table, path: Path) -> pa.Table:
+    try:
+        schema = table.schema(list(frame.columns))
+        arrow = pa.Table.from_pandas(frame, schema=schema, preserve_index=False).replace_schema_metadata(None)
+        arrow.validate(full=True)
+    except (ValueError, TypeError, pa.ArrowException) as error:
+        raise ValueError(f"{path.name}: {' '.join(str(error).split())}") from None
+    for name in schema.names:
+        if not schema.field(name).nullable and arrow[name].null_count:
+            raise ValueError(f"{path.name}: column {name} has missing values")
+    return arrow
+
+
+def _nullable(kind: pa.DataType) -> Any:
+    return pd.Int64Dtype() if kind == INTEGER else None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

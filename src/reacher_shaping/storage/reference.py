@@ -1,0 +1,96 @@
+"""The reference run: its summaries, kept in the repository, and how another run compares with it."""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_studies, read_table, write_table
+
+TABLES = {
+    "runs.parquet": schemas.RUNS,
+    "cells.parquet": schemas.CELLS,
+    "curves.parquet": schemas.CURVES,
+    "correlation.csv": schemas.CORRELATION,
+    "correlation_published.csv": schemas.CORRELATION,
+    "claims.csv": schemas.CLAIMS,
+    "claim_parts.csv": schemas.CLAIM_PARTS,
+    "controllers.parquet": schemas.CONTROLLERS,
+    "radii.parquet": schemas.RADII,
+    "long_episodes.parquet": schemas.ALL_LONG_EPISODES,
+    "lengths.parquet": schemas.LENGTHS,
+    "comparisons.parquet": schemas.COMPARISONS,
+    "variance.parquet": schemas.VARIANCE,
+    "power.parquet": schemas.POWER,
+    "lottery.csv": schemas.LOTTERY,
+    "winners.csv": schemas.WINNERS,
+    "spread.csv": schemas.SPREAD,
+}
+"""The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
+OPTIONAL = {"peers.parquet": schemas.PEERS, "search/trials.csv": schemas.TRIALS}
+"""Tables that are kept with it where the run has them."""
+
+
+def keep_tables(results: Path, kept: Path) -> None:
+    """Write the reference tables of `results` into the folder `kept`; an optional one that is not there is none there.
+
+    Raises ArtifactError where another is missing or damaged.
+    """
+    for name, table in (TABLES | OPTIONAL).items():
+        if name in OPTIONAL and not (results / name).exists():
+            (kept / name).unlink(missing_ok=True)
+            continue
+        _keep(results / name, kept / name, table)
+
+
+def keep_experiments(results: Path, kept: Path, files: Mapping[str, Sequence[str]]) -> list[str]:
+    """Write the tables of those further studies that are complete; return their names. Raises ArtifactError.
+
+    `files` are the names of each study's tables.
+    """
+    folders = {name: results / "experiments" / name for name in files}
+    made = [name for name, folder in folders.items() if all((folder / file).exists() for file in files[name])]
+    found = read_studies(str(folders[name] / file) for name in made for file in files[name])
+    shutil.rmtree(kept / "experiments", ignore_errors=True)
+    for name in made:
+        for file in files[name]:
+            stem = Path(file).stem
+            target = kept / "experiments" / name / file
+            write_table(target, found[name][stem], schemas.STUDY_TABLES[stem], sealed=False)
+    return made
+
+
+def _keep(source: Path, target: Path, table: schemas.Table) -> None:
+    write_table(target, read_table(source, table), table, sealed=False)
+
+
+def manifest(
+    settings: Mapping[str, Any],
+    settings_hash: str,
+    blocks: Sequence[Mapping[str, Any]],
+    further: Mapping[str, Sequence[Mapping[str, Any]]],
+    peers: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Return what the reference run was: settings, and the record of each block, further study's block and peer.
+
+    The records are without their inputs.
+    """
+    numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads")
+    kept = ("algorithm", "seeds", "git", "machine", "versions", "outputs", *numbers)
+
+    def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        return [{name: block[name] for name in kept if name in block} for block in given]
+
+    return {
+        "study": settings,
+        "settings_hash": settings_hash,
+        "blocks": records(blocks),
+        "experiments": {name: records(given) for name, given in further.items()},
+        "peers": records(peers),
+    }
+
+
+def _spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
+    """Environment steps and core hours of blocks."""
+    return sum(block["env_steps"] for block in blocks), sum(block["cpu_seconds"] for block in blocks) / 3600

@@ -1,0 +1,262 @@
+"""Training of one block of seeds: collect, shape, estimate advantages, update; once an iteration.
+
+`train` is a generator of states, so that its caller decides what to do between iterations (show
+progress, keep a checkpoint, stop), and a state is all it takes to go on.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from reacher_shaping.random_streams import Purpose, stream
+from reacher_shaping.settings.cell import PPO, Cell
+from reacher_shaping.storage.schemas import MEASURES
+from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS
+from reacher_shaping.training import advantage, ppo, shaping
+from reacher_shaping.training.policy import Policy, forward, initialise, inputs
+from reacher_shaping.training.rollout import Collector, Plan, Rollout, environment_reward
+
+Array = NDArray[np.float64]
+Rows = dict[str, NDArray[Any]]
+RELEASED_LOG_EPISODES = 10
+"""Episodes of a rollout, the last ones, that the released code's logged return is the mean of."""
+
+
+@dataclass
+class TrainState:
+    """All that a run is after `iteration` of its I iterations.
+
+    The logs have their full size from the start: arrays kept from each iteration would lie between those that are
+    freed and fragment the memory.
+
+    Attributes:
+        seeds: run seeds of the block.
+        rows: [S, P] parameters.
+        adam: Adam's state.
+        progress: [S, I] of each of `MEASURES`, NaN from `iteration` on.
+        episode_returns: [S, I, E] unshaped returns of the episodes that reached the time limit.
+        rollout_steps: environment steps of an iteration.
+        unlogged: [S] shaped return of the last rollout's steps after its last whole episode.
+        iteration: iterations done.
+    """
+
+    seeds: tuple[int, ...]
+    rows: Tensor
+    adam: ppo.Adam
+    progress: Rows
+    episode_returns: Array
+    rollout_steps: int
+    unlogged: Array
+    iteration: int = 0
+
+    @classmethod
+    def start(cls, cell: Cell, seeds: Sequence[int]) -> "TrainState":
+        """Return the state before the first iteration."""
+        settings = cell.protocol.ppo
+        rows = initialise(seeds, cell.root_seed, settings)
+        shape = (len(seeds), cell.iterations)
+        progress = {name: np.full(shape, np.nan) for name in MEASURES}
+        returns = np.full((*shape, Plan(settings.rollout_steps).episodes), np.nan)
+        unlogged = np.zeros(len(seeds))
+        return cls(tuple(seeds), rows, ppo.Adam.zeros_like(rows), progress, returns, settings.rollout_steps, unlogged)
+
+    def policy(self, cell: Cell) -> Policy:
+        """Return the policy as trained so far."""
+        return Policy(self.rows, cell.protocol.ppo.hidden_units, cell.protocol.ppo.towers)
+
+    def diverged(self) -> list[int]:
+        """Return the seeds whose parameters are no longer finite."""
+        finite = torch.isfinite(self.rows).all(dim=1).tolist()
+        return [seed for seed, ok in zip(self.seeds, finite, strict=True) if not ok]
+
+    def progress_frame(self) -> pd.DataFrame:
+        """Return `progress.parquet`: a row per seed and iteration, ordered by seed."""
+        iterations = np.tile(np.arange(1, self.iteration + 1), len(self.seeds))
+        return pd.DataFrame(
+            {
+                "seed": np.repeat(self.seeds, self.iteration),
+                "iteration": iterations,
+                "env_steps": iterations * self.rollout_steps,
+                **{name: values[:, : self.iteration].ravel() for name, values in self.progress.items()},
+            }
+        )
+
+    def episodes_frame(self) -> pd.DataFrame:
+        """Return the training episodes, a row each: seed, iteration, episode_return, episode_length, env_steps.
+
+        `env_steps` counts the environment steps of training done when the episode ended.
+        """
+        returns = self.episode_returns[:, : self.iteration]
+        seeds, iterations, episodes = returns.shape
+        iteration = np.tile(np.repeat(np.arange(iterations), episodes), seeds)
+        within = np.tile(EPISODE_STEPS * np.arange(1, episodes + 1), seeds * iterations)
+        return pd.DataFrame(
+            {
+                "seed": np.repeat(self.seeds, iterations * episodes),
+                "iteration": iteration + 1,
+                "episode_return": returns.ravel(),
+                "episode_length": EPISODE_STEPS,
+                "env_steps": iteration * self.rollout_steps + within,
+            }
+        )
+
+
+def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState | None = None) -> Iterator[TrainState]:
+    """Train the block and yield its state after every iteration (the same object, changed in place).
+
+    Args:
+        cell: what to train.
+        seeds: run seeds of the block, in any number.
+        radius: m, tip-target distance that counts as success in the progress rows.
+        state: a state to go on from; without it training starts at iteration 0.
+
+    A seed whose numbers stop being finite is carried on as such and touches no other.
+    """
+    settings = cell.protocol.ppo
+    plan = Plan(settings.rollout_steps)
+    state = state or TrainState.start(cell, seeds)
+    learner = ppo.Learner(state.rows, settings, state.adam)
+    collector = Collector(seeds, cell.root_seed, plan, clip_actions=cell.protocol.environment.clip_actions)
+    policy = state.policy(cell)
+    while state.iteration < cell.iterations:
+        rollout = collector.collect(policy, state.iteration)
+        records, summary = prepare(cell, policy, rollout, plan, state.iteration, radius)
+        rate = learning_rate(settings, state.iteration / cell.iterations)
+        learner.update(records, _shuffles(cell, seeds, state.iteration), rate)
+        losses = ppo.diagnose(learner.network, records, settings.clip_range)
+        measured = {
+            **summary,
+            "action_std": learner.network.log_std.exp().mean((1, 2)),
+            **losses._asdict(),
+        }
+        shaped, rest = measured.pop("shaped_returns"), measured.pop("rest")
+        state.episode_returns[:, state.iteration] = measured.pop("episode_returns")
+        if cell.protocol.log.episode_return == "released":
+            measured["logged_return"] = released_log(shaped, state.unlogged)
+        else:
+            measured["logged_return"] = measured["episode_return"]
+        state.unlogged = rest
+        for name, values in measured.items():
+            state.progress[name][:, state.iteration] = values
+        state.iteration += 1
+        yield state
+
+
+def learning_rate(settings: PPO, done: float) -> float:
+    """Return Adam's learning rate when the share `done` of all iterations is over; "linear" falls to 0 at the end."""
+    return (
+        settings.learning_rate * (1 - done) if settings.learning_rate_schedule == "linear" else settings.learning_rate
+    )
+
+
+def released_log(shaped: Array, unlogged: Array) -> Array:
+    """Return what the code released with the paper logs for an iteration, [S].
+
+    Args:
+        shaped: [S, E] shaped returns of the rollout's whole episodes.
+        unlogged: [S] shaped return of the rollout before, after its last whole episode. The running sum of an
+            episode is not cleared where a rollout starts, so the first episode's contains it. With the paper's 40
+            episodes a rollout the first is not among the last ten, so it never shows there.
+    """
+    logged = shaped.copy()
+    logged[:, 0] += unlogged
+    figure: Array = logged[:, -RELEASED_LOG_EPISODES:].mean(1)
+    return figure
+
+
+def prepare(
+    cell: Cell, policy: Policy, rollout: Rollout, plan: Plan, iteration: int, radius: float
+) -> tuple[Tensor, Rows]:
+    """Turn a rollout into sample records [S, N, 16] and the rollout's summary, [S] each.
+
+    Samples stand in the order of the sequential rollout. The summary also holds `episode_returns`
+    [S, E], unshaped, `shaped_returns` [S, E], and `rest` [S], the shaped return of the steps after the last
+    whole episode.
+    """
+    settings = cell.protocol.ppo
+    reward = environment_reward(rollout.distance, rollout.control, cell.protocol.environment.control_weight)
+    extra = shaping.shaping_reward(
+        rollout.distance,
+        plan.order + iteration * plan.steps,
+        plan.ends,
+        variant=cell.variant,
+        alpha0=cell.alpha0,
+        discount=settings.discount,
+        settings=cell.protocol.shaping,
+    )
+    features, log_prob, values = _outputs(policy, rollout)
+    following = advantage.next_values(values, plan.ends, cell.protocol.shaping.episode_end)
+    advantages = advantage.gae(
+        reward + extra,
+        values[..., :-1],
+        following,
+        plan.ends,
+        discount=settings.discount,
+        gae_lambda=settings.gae_lambda,
+    )
+    advantages, fitted = plan.sequence(advantages), plan.sequence(values[..., :-1])
+    targets = advantages + fitted
+    records = ppo.pack(
+        plan.sequence(features),
+        plan.sequence(torch.from_numpy(rollout.action)),
+        plan.sequence(log_prob),
+        torch.from_numpy(advantage.normalise(advantages)).float(),
+        torch.from_numpy(targets).float(),
+    )
+    return records, {
+        **_summary(reward, extra, rollout, plan, radius),
+        "explained_variance": _explained(fitted, targets),
+    }
+
+
+@torch.inference_mode()
+def _outputs(policy: Policy, rollout: Rollout) -> tuple[Tensor, Tensor, Array]:
+    """Return inputs [S, L, T, 11], log-probabilities [S, L, T] and values [S, L, T+1] of a whole rollout."""
+    seeds, lanes, times, _ = rollout.observation.shape
+    features = inputs(rollout.observation)
+    output = forward(policy.layers, features.view(seeds, lanes * times, -1)).view(seeds, -1, lanes, times)
+    mean, values = output[:, :ACTION_SIZE, :, :-1], output[:, ACTION_SIZE]
+    log_std = policy.layers.log_std
+    action = torch.from_numpy(rollout.action).permute(0, 3, 1, 2)
+    deviation = ((action - mean) * torch.exp(-log_std)[..., None]).reshape(seeds, ACTION_SIZE, -1)
+    log_prob = ppo.log_probability(deviation, log_std).view(seeds, lanes, -1)
+    return features[:, :, :-1], log_prob, values.double().numpy()
+
+
+def _summary(reward: Array, extra: Array, rollout: Rollout, plan: Plan, radius: float) -> Rows:
+    """Return the means [S] over a rollout's whole episodes, their returns [S, E], and the return of the rest [S]."""
+    whole = slice(0, plan.episodes)
+    returns = reward[:, whole].sum(-1)
+    shaped = np.where(plan.ends.cumsum(1) - plan.ends, 0.0, reward + extra).sum(-1)
+    distance = rollout.distance[:, whole, 1:]
+    return {
+        "episode_returns": returns,
+        "episode_return": returns.mean(1),
+        "shaped_returns": shaped[:, whole],
+        "rest": shaped[:, plan.episodes :].sum(1),
+        "shaped_return": shaped[:, whole].mean(1),
+        "episode_length": np.full(len(returns), float(EPISODE_STEPS)),
+        "success_rate": (distance.min(-1) <= radius).mean(1),
+        "final_distance": distance[..., -1].mean(1),
+    }
+
+
+def _explained(values: Array, targets: Array) -> Array:
+    """Return 1 - Var(R - V) / Var(R) [S] of values and targets [S, N]; NaN where the targets are constant."""
+    variance = targets.var(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(variance > 0, 1 - (targets - values).var(axis=1) / variance, np.nan)
+
+
+def _shuffles(cell: Cell, seeds: Sequence[int], iteration: int) -> Tensor:
+    """Return each seed's own sample orders [S, epochs, N] of one iteration."""
+    settings = cell.protocol.ppo
+    base = np.tile(np.arange(settings.rollout_steps), (settings.epochs, 1))
+    generators = [stream(cell.root_seed, Purpose.SHUFFLES, seed, iteration) for seed in seeds]
+    return torch.from_numpy(np.stack([generator.permuted(base, axis=1) for generator in generators]))

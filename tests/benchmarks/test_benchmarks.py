@@ -1,0 +1,136 @@
+"""The benchmark runs, and what it compares with computes the same."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from cells import small
+from torch.utils.flop_counter import FlopCounterMode
+
+CLOCK_OFF = "+ profiling clock off"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture(autouse=True)
+def path(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+
+
+def test_every_rung_of_the_ladder_trains_the_same_weights():
+    import ladder
+
+    of = small("l2", iterations=3)
+    trained = {name: [next(iterator) for _ in range(2)][-1] for name, (_, iterator) in ladder.rungs(of, [4, 1]).items()}
+    network, _ = trained.pop("plain loop")
+    expected = network.state_dict()
+    assert list(trained) == ["+ lanes", "+ stack of seeds", "+ written-out gradient", "+ contacts off", CLOCK_OFF]
+    for name, state in trained.items():
+        weights = state.policy(of).weights()
+        for key, tensor in expected.items():
+            # Float32 sums in another order; training moves the weights a thousand times as far.
+            torch.testing.assert_close(weights[key][0], tensor, rtol=0, atol=2e-5, msg=f"{name}: {key}")
+    before = trained["+ written-out gradient"]
+    for name, idea in (("+ contacts off", "collision detection"), (CLOCK_OFF, "the profiling clock")):
+        assert torch.equal(trained[name].rows, before.rows), f"{idea} changes no bit"
+
+
+def test_the_floor_holds_every_matrix_product_of_an_iteration():
+    import floor
+    import ladder
+
+    of = small("l2", iterations=2)
+    iterator = ladder.engine(of, [0, 1, 2])
+    next(iterator)
+    with FlopCounterMode(display=False) as counter:
+        next(iterator)
+    expected = sum(
+        times * 2 * a.shape[0] * a.shape[1] * a.shape[2] * b.shape[2]
+        for times, operands in floor.matrix_products(of.protocol.ppo, 3)
+        for a, b in operands
+    )
+    assert counter.get_total_flops() == expected
+
+
+def test_the_floor_steps_as_the_engine_does_in_its_next_iteration(monkeypatch):
+    import floor
+    import ladder
+
+    of = small("l2", iterations=2)
+    iterator = ladder.engine(of, [0, 1, 2])
+    floor_of_three, state = floor.Floor(of, 3), next(iterator)
+    step, stepped = mujoco.mj_step, []
+
+    def recording(model, data, count):
+        stepped.append([*data.qpos, *data.qvel, *data.ctrl])
+        step(model, data, count)
+
+    monkeypatch.setattr(mujoco, "mj_step", recording)
+    floor_of_three.physics(state)  # collects, then steps again
+    collected, replayed = np.split(np.array(stepped), 2)
+    stepped.clear()
+    next(iterator)
+    assert np.array_equal(replayed, stepped)
+    assert np.array_equal(collected, stepped)
+
+
+def test_the_fraction_of_the_floor():
+    import floor
+
+    assert floor.fraction(10, 30, 60) == pytest.approx(0.5)  # 1/30 + 1/60 of a second a step, of 1/10
+
+
+def test_what_prepares_a_share_of_the_floor_does_not_count(monkeypatch):
+    import floor
+
+    of = floor.Floor(small("l2", iterations=1), 3)
+    ticks = iter([2.0, 6.0])
+    monkeypatch.setattr(floor.time, "process_time", lambda: next(ticks))
+    steps = of.alone(lambda: 1.0)()  # a second of the four is the share
+    assert steps / 4.0 == 3 * of.plan.steps / 1.0
+
+
+def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
+    command = [sys.executable, str(BENCHMARKS / "run.py"), "--quick", "--out", str(tmp_path)]
+    subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True)
+    table = pd.read_csv(tmp_path / "results.csv")
+    parts = {
+        "training",
+        "floor",
+        "evaluation",
+        "jobs",
+        "ladder",
+        "ladder gain",
+        "seeds per block",
+        "budget",
+        "workflow",
+    }
+    assert set(table["part"]) == parts
+    assert (table["value"] > 0).all()
+    assert ((table["low"] <= table["value"]) & (table["value"] <= table["high"])).all()
+    assert table[["machine", "threads", "versions", "repeats"]].notna().all(axis=None)
+    assert table["must"].notna().sum() == 9
+    text = (tmp_path / "results.md").read_text()
+    assert all(name in text for name in table["name"])
+    assert "<svg" in (tmp_path / "results.svg").read_text()
+
+
+def test_cost_of_a_study_is_the_sum_over_its_blocks():
+    import cost
+
+    from reacher_shaping.settings.study import load_study
+
+    study = load_study(Path(__file__).parents[2] / "config.yaml")
+    rates = cost.Rates(training=20_000, evaluation=50_000, start=3)
+    found = cost.study(study, seeds=12, seeds_per_block=10, rates=rates)
+    # 14 cells of 500,000 steps (245 iterations) and 9 of 1,000,000 (489), each a block of ten and a block of two
+    steps = (14 * 245 + 9 * 489) * 2048
+    assert found.env_steps == 12 * steps
+    episodes = 23 * 12 * 2 * 1000 * 50
+    assert found.core_seconds == pytest.approx(12 * steps / 20_000 + episodes / 50_000 + 23 * 2 * 2 * 3)
+    assert found.longest_job == pytest.approx(6 + 10 * (489 * 2048 / 20_000 + 100_000 / 50_000))

@@ -1,0 +1,268 @@
+"""The further studies' figures and their section of the report show the numbers of their tables."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic
+from switched import MEANS, PROTOCOLS, SWITCHES, labelled_runs, peers
+from switched import runs as switched_runs
+
+from reacher_shaping.analysis import comparisons, switch_effects
+from reacher_shaping.analysis.baselines import agreement_frame
+from reacher_shaping.figures import studies
+from reacher_shaping.figures.style import to_bytes
+from reacher_shaping.report import paper_tables, study_sections, study_tables
+
+LOGS = pd.DataFrame(
+    [{"run": "none_seed0", "protocol": "released", "variant": "none", "budget": 500_000, "peak_return": -38.6,
+      "peak_iteration": 33, "final_return": -87.2, "std_1": 0.4, "std_2": 0.54}]
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def effects():
+    return switch_effects.effects_frame(switched_runs(MEANS), SWITCHES, PROTOCOLS, 0)
+
+
+@pytest.fixture(scope="module")
+def released():
+    runs = labelled_runs().replace({"protocol": {"late": "released_late"}})
+    keys = runs[["protocol", "variant", "budget", "alpha0", "seed"]]
+    numbers = {"peak_return": -40.0 - runs["seed"], "peak_iteration": 30.0 + runs["seed"]}
+    logs = keys.assign(**numbers, final_return=-90.0, action_std=0.45)
+    return {
+        "runs": runs,
+        "cells": synthetic.summary(runs),
+        "logs": logs,
+        "comparisons": comparisons.comparison_frame(runs, 0, (*comparisons.METRICS, *comparisons.SPEED)),
+        "correlation": switch_effects.correlation_frame(runs, synthetic.published(), "released", 0),
+    }
+
+
+@pytest.fixture(scope="module")
+def section(released):
+    return study_sections.section("released", released, LOGS, synthetic.correlation())
+
+
+def test_effects_figure_has_each_difference_with_its_interval(effects):
+    figure = studies.effects(effects)
+    for axes, metric in zip(figure.axes, studies.EFFECT_LABELS, strict=True):
+        drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_label() == "_effect")
+        shown = effects[(effects["metric"] == metric) & (effects["effect"] != "interaction")]
+        assert drawn == pytest.approx(sorted(shown["difference"]))
+    axes = figure.axes[0]
+    shown = effects[(effects["metric"] == "success_rate") & (effects["effect"] != "interaction")]
+    filled = [line for line in axes.lines if line.get_label() == "_effect" and line.get_markerfacecolor() != "white"]
+    assert len(filled) == ((shown["ci_low"] > 0) | (shown["ci_high"] < 0)).sum() > 0
+    assert [label.get_text() for label in axes.get_yticklabels()] == [
+        "all switches", "a\nepochs 10 to 5", "b\ndiscount 0.99 to 0.5",
+    ]  # fmt: skip
+
+
+def test_effects_without_rows_are_an_empty_figure(effects):
+    assert to_bytes(studies.effects(effects.head(0)), "svg")
+
+
+def test_cells_figure_has_a_dot_per_run_in_every_panel(released):
+    controllers = synthetic.controllers().assign(protocol="released", mode="stochastic", final_success_rate=1.0)
+    controllers.loc[3, "controller"] = "inverse kinematics + PD"
+    figure = studies.cells(released["runs"], released["cells"], controllers)
+    for axes, metric in zip(figure.axes, studies.STRIP, strict=True):
+        dots = [x for line in axes.lines if line.get_label() == "_runs" for x in line.get_xdata()]
+        assert sorted(dots) == pytest.approx(sorted(released["runs"][metric]))
+    ceilings = [line.get_xdata()[0] for axes in figure.axes for line in axes.lines if line.get_label() == "_controller"]
+    rows = (released["cells"]["protocol"] == "released").sum()  # the other protocol has no controllers here
+    assert sorted(ceilings) == sorted([1.0, 1.0, -3.7] * rows)
+    without = studies.cells(released["runs"], released["cells"])
+    assert not [line for axes in without.axes for line in axes.lines if line.get_label() == "_controller"]
+
+
+def test_log_figure_sets_the_published_peak_and_end_beside_the_curve_of_the_same_budget():
+    key = {"protocol": "released", "variant": "none", "alpha0": 1.0, "seeds": 5, "low": np.nan, "high": np.nan}
+    parts = [
+        pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": -50.0, "budget": budget, **key})
+        for budget in (500_000, 1_000_000)
+    ]
+    parts.append(parts[0].assign(alpha0=0.5))  # a label of other runs than the published log's
+    figure = studies.log(pd.concat(parts), LOGS)
+    marks = [line for axes in figure.axes for line in axes.lines if line.get_label() == "_published"]
+    assert [list(line.get_xdata()) for line in marks] == [[33, 245]]
+    assert [list(line.get_ydata()) for line in marks] == [[-38.6, -87.2]]
+    assert marks[0] in figure.axes[0].lines
+
+
+def test_log_figure_shows_the_moving_average_in_which_the_published_log_is_told():
+    key = {"protocol": "released", "variant": "none", "budget": 500_000, "seeds": 5, "low": np.nan, "high": np.nan}
+    curve = -50 - 10 * np.sin(np.arange(245.0))
+    parts = [
+        pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": curve, "alpha0": a, **key}) for a in range(5)
+    ]
+    figure = studies.log(pd.concat(parts).sample(frac=1, random_state=2), LOGS)
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(shown) == 5
+    assert shown[2].get_position().y1 < shown[0].get_position().y0, "more than three settings stand in rows of two"
+    line = next(line for line in shown[0].lines if line.get_label() == "none")
+    np.testing.assert_allclose(line.get_ydata(), np.convolve(curve, np.ones(20) / 20, mode="valid"))
+    assert (line.get_xdata()[0], line.get_xdata()[-1]) == (20, 245)
+
+
+def test_correlation_figure_has_a_panel_each_for_the_published_and_ours(released):
+    figure = studies.correlation(released["correlation"])
+    titles = [axes.get_title(loc="left") for axes in figure.axes[:2]]
+    assert titles == ["Published Table 2", "Released code, labels as published"]
+    table = released["correlation"]
+    for axes, level in zip(figure.axes[:2], ("published", "cells"), strict=True):
+        chosen = table[(table["level"] == level) & (table["method"] == "pearson")]
+        own = chosen[(chosen["x"] == "alpha0") & (chosen["y"] == "mean_return")]["r"].iloc[0]
+        assert any(text.get_text().startswith(f"{own:.2f}") for text in axes.texts), level
+
+
+def test_section_tells_the_correlation_beside_the_published_one(section):
+    row = section.grids[next(name for name in section.grids if name.startswith("Pearson"))].rows[0]
+    assert row[0] == "r(α₀, return)"
+    assert row[1].startswith("0.91 [")
+    said = " ".join(section.sentences)
+    assert row[1] in said
+    assert row[2] in said
+    assert row[-1].startswith("0.91 [")  # of the main study, made up
+    assert section.figures == ["released_cells", "released_log", "released_correlation", "released_forest"]
+
+
+def test_section_sets_every_published_run_beside_ours(released):
+    names = ("table2.csv", "table3.csv", "left_out.csv")
+    published = paper_tables.published_cells(*(pd.read_csv(synthetic.PUBLISHED / name) for name in names))
+    assert len(published) == 24
+    section = study_sections.section("released", released, LOGS, published=published)
+    grid = section.grids[next(name for name in section.grids if name.startswith("Every published run"))]
+    rows = {row[0]: [entry.replace("\N{MINUS SIGN}", "-") for entry in row[1:]] for row in grid.rows}
+    assert len(rows) == len(released["cells"]) == 8
+    left_out = rows["none_500K_alpha_5"]
+    assert left_out[:3] == ["none", "500K, α₀ = 0.5", "0.296"]
+    assert left_out[4] == "-284.51"
+    cells = released["cells"].set_index(["variant", "budget", "alpha0"])
+    for place, metric in ((3, "success_rate"), (5, "mean_return")):
+        ours = cells.loc[("none", 500_000, 0.5)]
+        digits = 3 if metric == "success_rate" else 2
+        numbers = [ours[f"{metric}{end}"] for end in ("", "_low", "_high")]
+        assert left_out[place] == "{} [{}, {}]".format(*(f"{value:.{digits}f}" for value in numbers))
+
+
+def test_section_lists_our_logs_and_then_the_published_one(section):
+    grid = section.grids[next(name for name in section.grids if "own log" in name)]
+    rows = [[entry.replace("\N{MINUS SIGN}", "-") for entry in row] for row in grid.rows]
+    assert rows[0][:4] == ["released", "none", "500K, α₀ = 1", "31 [30, 32]"]
+    assert rows[0][4:] == ["-41.0 [-42.0, -40.0]", "-90.0 [-90.0, -90.0]", "0.45 [0.45, 0.45]"]
+    assert rows[-1] == ["published, none_seed0", "none", "500K", "33", "-38.6", "-87.2", "0.40 and 0.54"]
+    assert len(rows) == 8 + 1
+
+
+def test_section_of_switches_names_the_largest_effect_and_the_interactions(released, effects):
+    given = {**released, "effects": effects}
+    text = " ".join(study_sections.section("attribution", given, LOGS).sentences)
+    assert "success, any step: a: epochs 10 to 5 (none, as the last one, to the end), 0.200 [0.200, 0.200]" in text
+    assert (
+        "What a switch does depends on the others beyond chance for a on" not in text
+    )  # p is 2 / 2^6, not corrected away
+    assert "No switch's effect depends on the others beyond chance." in text
+    strong = effects.assign(p_holm=effects["p_holm"] / 10)
+    text = study_sections.effects_sentence(strong)
+    assert "depends on the others beyond chance for a (success" in text
+
+
+def test_the_largest_effect_may_be_a_loss(effects):
+    first = (effects["effect"] == "alone") & (effects["switch"] == "b") & (effects["metric"] == "success_rate")
+    moved = effects.assign(difference=np.where(first, -0.7, effects["difference"]))
+    assert "success, any step: b: discount 0.99 to 0.5 (none, alone" in study_sections.effects_sentence(moved)
+
+
+def test_best_cell_is_the_one_with_the_highest_success(released):
+    cells = released["cells"].assign(success_rate=0.1)
+    cells.loc[(cells["variant"] == "l2sq"), "success_rate"] = 0.9
+    text = study_sections.best_sentence(cells)
+    assert text.startswith("The cell with the highest success rate is released late, L2² (500K, α₀ = 0.5): success")
+    assert "any step 0.900" in text
+
+
+def test_one_seed_a_cell_ranges_over_the_studies_of_one_seed(section, released):
+    own = released["correlation"][released["correlation"]["method"] == "pearson"]
+    own = own[own["level"].isin(["seed0", "seed1", "seed2"])].groupby(["x", "y"])["r"].agg(["min", "max"])
+    rows = section.grids[next(name for name in section.grids if name.startswith("Pearson"))].rows
+    for row, pair in zip(rows, study_tables.PAIRS, strict=True):
+        span = row[4].replace("\N{MINUS SIGN}", "-")
+        assert span == "{min:.2f} to {max:.2f}".format(**own.loc[pair])
+
+
+def test_section_says_whether_a_peer_differs(released):
+    ours = synthetic.runs([("standard", "none", 500_000, 1.0)], 8)
+    same = study_sections.agreement_sentence(agreement_frame(ours, peers()))
+    assert same.startswith("None of 8 measures differs from Stable-Baselines3's beyond chance (8 seeds beside 5); the")
+    frame = agreement_frame(ours, peers())
+    low, high = (f"{frame[name].iloc[0]:.3f}".replace("-", "\N{MINUS SIGN}") for name in ("ci_low", "ci_high"))
+    assert same.endswith(f" [{low}, {high}].")
+    apart = study_sections.agreement_sentence(agreement_frame(ours, peers(0.5)))
+    assert apart.startswith("1 of 8 measures differ")
+    assert apart.endswith("success, any step.")
+    assert "to its PPO in success, any step is" in same
+    alone = agreement_frame(ours, peers(seeds=1))
+    assert study_sections.agreement_sentence(alone).endswith("cannot be told (8 seeds beside 1).")
+    uncorrected = agreement_frame(ours, peers()).assign(p=1e-9)
+    assert study_sections.agreement_sentence(uncorrected) == same
+
+
+def test_section_counts_the_differences_that_survive_holm(released):
+    shaped = released["comparisons"][released["comparisons"]["family"] == "none"].copy()
+    shaped["p_holm"] = np.where(shaped["metric"] == "final_distance", 0.01, 0.5)
+    shaped.loc[shaped["metric"] == "final_distance", "difference"] = -0.01
+    few = study_sections.shaping_sentence(shaped)
+    assert few == "With 3 seeds no difference between 3 shaped cells and none can be told from chance."
+    assert study_sections.shaping_sentence(shaped.assign(seeds=6)) == few.replace("3 seeds", "6 seeds")  # 3 / 2^5
+    text = study_sections.shaping_sentence(shaped.assign(seeds=10))
+    assert "distance at the last step (mm) in 5 of 5 (5 for the better)" in text
+    assert "success, any step in 0 of 5," in text
+
+
+def test_section_corrects_over_the_measures_of_the_only_shaped_cell(released):
+    shaped = released["comparisons"]
+    shaped = shaped[shaped["family"] == "none"].groupby("metric").head(1)
+    shaped = shaped.assign(seeds=10, p=0.5, p_holm=0.001, difference=-0.01, ci_low=-0.02, ci_high=0.01)
+    nothing = study_sections.shaping_sentence(shaped)
+    assert "(Holm over the measures, 5 %): nothing. Not to be told from chance: success, any step" in nothing
+    shaped.loc[shaped["metric"] == "final_distance", "p"] = 0.009  # 5 times as much once corrected: below 5 %
+    shaped.loc[shaped["metric"] == "mean_return", "p"] = 0.015  # 4 times as much: above
+    changed, chance = study_sections.shaping_sentence(shaped).split("Not to be told from chance")
+    minus = "\N{MINUS SIGN}"
+    assert f"5 %): distance at the last step (mm) {minus}10.0 [{minus}20.0, 10.0], p 0.045." in changed
+    assert f"mean return {minus}0.01 [{minus}0.02, 0.01], p 0.060" in chance
+    assert "success" not in changed
+    section = study_sections.section("tuned", {**released, "comparisons": shaped}, LOGS)
+    rows = section.grids[next(name for name in section.grids if name.endswith("Holm-corrected over a row"))].rows
+    assert [row[3:][1::2] for row in rows] == [["1.000", "1.000", "0.060", "0.045", "1.000"]], "as in the sentence"
+    few = study_sections.shaping_sentence(shaped.assign(seeds=7))  # 5 / 2^6
+    assert few == "With 7 seeds no difference between the shaped cell and none can be told from chance."
+
+
+def test_two_protocols_of_one_shaped_cell_are_no_only_cell(released):
+    shaped = released["comparisons"]
+    shaped = shaped[shaped["family"] == "none"].groupby(["protocol", "metric"]).head(1)
+    assert shaped["protocol"].nunique() == 2
+    losses = np.where(shaped["protocol"] == "released", 0.1, -0.1)
+    text = study_sections.shaping_sentence(shaped.assign(seeds=10, p_holm=0.01, difference=losses))
+    assert "success, any step in 2 of 2 (1 for the better)" in text
+
+
+def test_document_holds_every_table_and_figure(released):
+    controllers = synthetic.controllers().assign(protocol="released", mode="stochastic", final_success_rate=1.0)
+    curve = {"protocol": "released", "variant": "none", "alpha0": 1.0, "budget": 500_000, "episode_return": -50.0}
+    logged = pd.DataFrame({"iteration": [1, 2], **curve})
+    given = {"released": {**released, "controllers": controllers, "logged": logged}}
+    text = study_sections.document(given, LOGS)
+    assert text.startswith("## The study as the released code computes it")
+    assert text.count("<img ") == 4
+    assert text.count("| --: |") >= 4
+    assert study_sections.document({}, LOGS) == ""
+
+
+def test_unknown_experiment_has_a_section_too(released):
+    section = study_sections.section("my_study", released, LOGS)
+    assert (section.title, section.intro) == ("My study", "")
+    assert section.grids

@@ -1,0 +1,32 @@
+"""Tables as text: what is counted is said, and the numbers are those of the tables."""
+
+import synthetic
+
+from reacher_shaping.report import paper_tables, text_tables
+
+
+def test_seeds_are_counted_per_variant_and_setting():
+    grid = text_tables.study_grid(synthetic.cells(synthetic.PAPER_GRID, 4))
+    assert grid.headings == ["Variant", "500K, α₀ = 1", "1M, α₀ = 1", "500K, α₀ = 0.5", "1M, α₀ = 0.5"]
+    assert grid.rows[0] == ["none", "4", "4", "", ""]
+    assert grid.rows[-1] == ["decay 500K, L2²", "", "", "4", "4"]
+
+
+def test_diverged_runs_stand_beside_the_seeds():
+    runs = synthetic.diverge(synthetic.runs(synthetic.TOY_GRID, 3))
+    assert [row[1] for row in text_tables.study_grid(synthetic.summary(runs)).rows] == ["3", "3 (1 diverged)", "3"]
+
+
+def test_grid_of_a_table_is_its_readable_form():
+    table = paper_tables.behaviour(synthetic.cells(synthetic.TOY_GRID, 3))
+    grid = text_tables.of_table(table)
+    assert grid.rows == paper_tables.readable(table).to_numpy().tolist()
+    assert grid.texts == {0}
+
+
+def test_markdown_has_a_line_per_row_and_says_when_there_is_none():
+    grid = text_tables.Grid(["Variant", "Seeds"], [["L2", "3"]])
+    assert text_tables.to_markdown(grid) == "| Variant | Seeds |\n| :-- | --: |\n| L2 | 3 |"
+    assert text_tables.to_markdown(text_tables.Grid(["Variant", "Seeds"], [])).endswith(
+        "| no such cells in this study |  |"
+    )

@@ -1,0 +1,40 @@
+"""A further study has the figures that its cells can fill."""
+
+import pytest
+
+from reacher_shaping.settings.outputs import views
+from reacher_shaping.settings.study import load_study, require_mapping
+
+
+def keys(*cells):
+    return [dict(zip(("protocol", "variant", "alpha0"), cell, strict=True)) for cell in cells]
+
+
+@pytest.mark.parametrize(
+    ("cells", "switches", "expected"),
+    [
+        (keys(("paper", "none", 1.0)), False, ["cells", "log"]),
+        (keys(("paper", "none", 1.0), ("released_late_without_d1", "none", 1.0)), True, ["cells", "effects"]),
+        (keys(("released", "none", 1.0), ("released", "l2", 3.0)), False, ["cells", "log"]),
+        (keys(("late", "none", 1.0), ("late", "none", 0.5)), False, ["cells", "log", "correlation"]),
+        (keys(*(("standard", name, 1.0) for name in ("none", "l2", "l2sq"))), False, ["cells", "log", "forest"]),
+        (keys(*(("standard", name, 1.0) for name in ("l2sq", "l2", "decay"))), False, ["cells", "log"]),
+    ],
+)
+def test_views_follow_from_the_cells(cells, switches, expected):
+    assert views(cells, switches=switches) == expected
+
+
+def test_the_studies_of_the_configuration_have_theirs():
+    study = load_study(require_mapping("config.yaml"))
+    found = {
+        name: views([cell.key for cell in cells], switches=study.experiments[name].switches is not None)
+        for name, cells in study.experiment_cells.items()
+    }
+    assert found == {
+        "released": ["cells", "log", "correlation", "forest"],
+        "attribution": ["cells", "effects"],
+        "standard": ["cells", "log", "forest"],
+        "tuned": ["cells", "log"],
+        "ablation": ["cells", "effects"],
+    }

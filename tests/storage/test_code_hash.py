@@ -1,0 +1,144 @@
+"""The tracer on a small package with sub-packages: what an edit reruns, and what it does not."""
+
+import textwrap
+
+import pytest
+
+from reacher_shaping.storage import code_hash as tracer
+from reacher_shaping.storage.code_hash import code_hash, reachable_code, reached_files
+
+MODULES = {
+    "numbers": """
+        import math
+        from scipy import stats
+
+        SCALE = 2
+        UNUSED = 3
+
+        def double(x):
+            \"\"\"Twice x.\"\"\"
+            # a comment
+            return SCALE * _identity(x)
+
+        def _identity(x):
+            return x
+
+        def other(x):
+            return math.floor(x + UNUSED)
+    """,
+    "plane/shapes": """
+        from reacher_shaping import numbers
+        from reacher_shaping.numbers import double as twice
+
+        class Square:
+            def area(self, side):
+                return numbers.other(side)
+
+        class Line:
+            def length(self, side):
+                return twice(side)
+    """,
+    "plane/__init__": "",
+    "jobs/progress": "def say(): return 1",
+}
+SCRIPT = """
+from reacher_shaping.plane import shapes
+from reacher_shaping.jobs.progress import say
+
+print(shapes.Line().length(3), say())
+"""
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A small package in place of ours; gives a function that changes one of its files and hashes the script again."""
+    for name, text in MODULES.items():
+        path = tmp_path / f"{name}.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(textwrap.dedent(text))
+    (tmp_path / "script.py").write_text(SCRIPT)
+    monkeypatch.setattr(tracer, "FOLDER", tmp_path)
+
+    def edited(name, old, new):
+        path = tmp_path / f"{name}.py"
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+        tracer._source.cache_clear()
+        return code_hash(tmp_path / "script.py")
+
+    edited.folder = tmp_path
+    tracer._source.cache_clear()
+    yield edited
+    tracer._source.cache_clear()
+
+
+def test_only_definitions_that_are_reached_count(package):
+    code = reachable_code(package.folder / "script.py")
+    assert {name for name in code if not name.endswith(":")} == {
+        "script",
+        "plane.shapes:Line",
+        "numbers:double",
+        "numbers:_identity",
+        "numbers:SCALE",
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("numbers", "SCALE = 2", "SCALE = 4"),
+        ("numbers", "return x", "return -x"),
+        ("plane/shapes", "twice(side)", "twice(-side)"),
+        ("script", "length(3)", "length(4)"),
+    ],
+)
+def test_edit_of_reached_code_changes_the_hash(package, name, old, new):
+    assert package("script", "print", "print") != package(name, old, new)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("numbers", "# a comment", "# another"),
+        ("numbers", "Twice x.", "Two times x."),
+        ("numbers", "SCALE * _identity(x)", "(\n        SCALE * _identity(x)\n    )"),
+        ("numbers", "UNUSED = 3", "UNUSED = 4"),
+        ("numbers", "math.floor(x + UNUSED)", "0"),
+        ("plane/shapes", "numbers.other(side)", "0"),
+        ("jobs/progress", "return 1", "return 2"),
+        ("script", "print", "# a comment\nprint"),
+    ],
+)
+def test_other_edits_leave_the_hash(package, name, old, new):
+    assert package("script", "print", "print") == package(name, old, new)
+
+
+def test_module_handed_on_as_a_value_counts_whole(package):
+    package("script", "print(", "print(vars(shapes), ")
+    assert {"plane.shapes:Square", "numbers:other"} <= reachable_code(package.folder / "script.py").keys()
+
+
+def test_reached_files_are_those_of_the_definitions_that_count(package):
+    paths = reached_files(package.folder / "script.py")
+    assert [str(path.relative_to(package.folder)) for path in paths] == ["script.py", "numbers.py", "plane/shapes.py"]
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from reacher_shaping.plane.shapes import Line",
+        "import reacher_shaping.plane.shapes as shapes; Line = shapes.Line",
+        "from reacher_shaping.plane import shapes; Line = shapes.Line",
+    ],
+)
+def test_every_way_of_importing_from_a_sub_package_is_followed(package, statement):
+    (package.folder / "other.py").write_text(f"{statement}\nLine().length(1)\n")
+    assert {"plane.shapes:Line", "numbers:double"} <= reachable_code(package.folder / "other.py").keys()
+
+
+@pytest.mark.parametrize("statement", ["from .plane import shapes", "import reacher_shaping.plane.shapes"])
+def test_import_that_cannot_be_followed_is_refused(package, statement):
+    (package.folder / "other.py").write_text(f"{statement}\n")
+    with pytest.raises(ValueError, match=r"plane.*: write `from reacher_shaping\.\.\. import "):
+        code_hash(package.folder / "other.py")

@@ -1,0 +1,147 @@
+"""The reference run in the repository, what the README says of it, and the comparison with another run."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import synthetic
+
+from reacher_shaping.analysis.agreement import agreement, compare
+from reacher_shaping.figures import bars
+from reacher_shaping.figures.style import save
+from reacher_shaping.report import paper_tables
+from reacher_shaping.report.readme import headline, put_headline, sections
+from reacher_shaping.settings import outputs
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import ArtifactError, read_table, write_table
+from reacher_shaping.storage.reference import TABLES, keep_experiments, keep_tables
+
+ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "report" / "reference"
+needs_reference = pytest.mark.skipif(not (KEPT / "manifest.json").exists(), reason="no reference run is kept")
+
+
+def read(name):
+    return read_table(KEPT / name, TABLES[name])
+
+
+def published():
+    return paper_tables.published_cells(
+        *(pd.read_csv(ROOT / f"report/published/table{number}.csv") for number in (2, 3))
+    )
+
+
+def make_runs(shift=0.0, seeds=6, first=0):
+    rows = []
+    for variant, base in (("none", 0.3), ("l2", 0.25)):
+        for seed in range(first, first + seeds):
+            rate = base + 0.01 * ((7 * seed) % 5) + (shift if variant == "l2" else 0.0)
+            key = {"protocol": "paper", "variant": variant, "budget": 500_000, "alpha0": 1.0, "seed": seed}
+            rows.append(key | {"success_rate": rate, "mean_return": -10 - 10 * rate})
+    return pd.DataFrame(rows)
+
+
+@needs_reference
+def test_readme_says_what_the_reference_tables_hold():
+    record = json.loads((KEPT / "manifest.json").read_text())
+    text = headline(
+        read("cells.parquet"),
+        read("claims.csv"),
+        published(),
+        record,
+        "report/reference/headline.svg",
+        sections(KEPT, pd.read_csv(ROOT / "report/published/training_logs.csv")),
+    )
+    assert put_headline((ROOT / "README.md").read_text(), text) == (ROOT / "README.md").read_text()
+
+
+@needs_reference
+def test_headline_figure_is_drawn_from_the_reference_tables(tmp_path):
+    figure = bars.figure_2(read("cells.parquet"), published(), controllers=read("controllers.parquet"))
+    save(figure, tmp_path / "figure_2")
+    assert (tmp_path / "figure_2.svg").read_text() == (KEPT / "headline.svg").read_text()
+
+
+@needs_reference
+def test_reference_cells_are_the_means_of_its_runs():
+    runs, cells = read("runs.parquet"), read("cells.parquet")
+    means = runs.groupby(["variant", "budget", "alpha0"])["success_rate"].mean()
+    kept = cells.set_index(["variant", "budget", "alpha0"])["success_rate"]
+    assert np.allclose(means, kept.loc[means.index], rtol=0, atol=1e-12)
+    assert len(cells) == 23
+    assert (cells["seeds"] == runs.groupby(["variant", "budget", "alpha0"]).size().iloc[0]).all()
+
+
+@needs_reference
+def test_tables_kept_are_those_of_the_run(tmp_path):
+    keep_tables(KEPT, tmp_path)
+    for name in TABLES:
+        assert (tmp_path / name).exists(), name
+    assert read("cells.parquet").equals(read_table(tmp_path / "cells.parquet", schemas.CELLS))
+
+
+@needs_reference
+def test_peers_are_kept_where_the_run_has_them_and_go_where_it_has_none(tmp_path):
+    results, kept = tmp_path / "results", tmp_path / "kept"
+    shutil.copytree(KEPT, results)
+    (results / "peers.parquet").unlink(missing_ok=True)
+    write_table(results / "peers.parquet", synthetic.peers(), schemas.PEERS)
+    keep_tables(results, kept)
+    assert read_table(kept / "peers.parquet", schemas.PEERS).equals(synthetic.peers())
+    (results / "peers.parquet").unlink()
+    keep_tables(results, kept)
+    assert not (kept / "peers.parquet").exists()
+    assert (kept / "runs.parquet").exists()
+
+
+@needs_reference
+def test_further_studies_that_were_made_are_kept(tmp_path):
+    results, kept = tmp_path / "results", tmp_path / "kept"
+    shutil.copytree(KEPT, results / "experiments" / "mine")
+    logs = pd.DataFrame({"protocol": ["a"], "variant": ["none"], "budget": [1], "alpha0": [1.0], "seed": [0]})
+    write_table(results / "experiments/mine/logs.parquet", logs, schemas.LOGS)
+    shutil.copy(KEPT / "curves.parquet", results / "experiments/mine/logged.parquet")
+    (kept / "experiments" / "old").mkdir(parents=True)
+    files = outputs.table_files(switches=False, peers=False)
+    assert keep_experiments(results, kept, {"mine": files, "yours": files}) == ["mine"]
+    assert [folder.name for folder in (kept / "experiments").iterdir()] == ["mine"]
+    assert {path.name for path in (kept / "experiments" / "mine").iterdir()} == set(files)
+    damaged = results / "experiments/mine/logs.parquet"
+    damaged.write_bytes(b"PAR1")
+    with pytest.raises(ArtifactError, match=r"logs\.parquet"):
+        keep_experiments(results, kept, {"mine": files})
+    assert (kept / "experiments/mine/logs.parquet").exists()  # what was kept stays until all is read
+    damaged.unlink()
+    assert keep_experiments(results, kept, {"mine": files}) == []
+
+
+def test_run_that_lacks_a_table_cannot_be_the_reference(tmp_path):
+    with pytest.raises(ArtifactError, match=r"runs\.parquet"):
+        keep_tables(tmp_path, tmp_path / "kept")
+
+
+def test_a_run_agrees_with_itself_and_with_other_seeds_of_the_same_kind():
+    assert agreement(compare(make_runs(), make_runs())).startswith("The runs agree: none of 2")
+    assert agreement(compare(make_runs(), make_runs(first=100))).startswith("The runs agree")
+
+
+def test_a_shifted_cell_is_named():
+    compared = compare(make_runs(shift=0.2), make_runs(first=3))
+    assert "differ beyond seed noise in 1 of 2 cells: paper/l2/500000/1.0" in agreement(compared)
+    row = compared[(compared["variant"] == "l2") & (compared["metric"] == "success_rate")].iloc[0]
+    assert row["difference"] == pytest.approx(0.2, abs=0.02)
+    assert row["ci_low"] < row["difference"] < row["ci_high"]
+
+
+def test_one_seed_cannot_tell():
+    assert agreement(compare(make_runs(seeds=1), make_runs())).startswith("Cannot tell")
+
+
+def test_headline_goes_between_its_marks_and_needs_them():
+    readme = "a\n<!-- reference: begin -->\nold\n<!-- reference: end -->\nb\n"
+    assert put_headline(readme, "new \\1\n") == readme.replace("old", "new \\1")
+    with pytest.raises(ValueError, match="marks"):
+        put_headline("no marks", "new")

@@ -1,0 +1,146 @@
+"""Shaping rewards telescope, follow their schedule and treat an episode's end as told."""
+
+import numpy as np
+import pytest
+from cells import VARIANTS
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from reacher_shaping.settings.cell import Shaping, Variant
+from reacher_shaping.training.shaping import alpha, potential, shaping_reward
+
+STEPS = 50
+DISTANCES = arrays(np.float64, STEPS + 1, elements=st.floats(0, 0.5))
+ALPHAS = st.floats(0.01, 10)
+DISCOUNTS = st.floats(0.5, 1)
+POTENTIALS = st.sampled_from(["l2", "l2sq"])
+
+
+def shaping_terms(distance, variant, *, alpha0=1.0, discount=0.99, start=0, **settings):
+    """F [T] of one lane of T steps."""
+    steps = len(distance) - 1
+    ends = (np.arange(steps) == steps - 1)[None]
+    return shaping_reward(
+        np.asarray(distance)[None, None],
+        (start + np.arange(steps))[None],
+        ends,
+        variant=variant,
+        alpha0=alpha0,
+        discount=discount,
+        settings=Shaping(**settings),
+    )[0, 0]
+
+
+def discounted_sum(terms, discount):
+    return float(np.sum(discount ** np.arange(len(terms)) * terms))
+
+
+def phi(name, distance):
+    return -distance if name == "l2" else -(distance**2)
+
+
+@given(DISTANCES, POTENTIALS, ALPHAS, DISCOUNTS)
+def test_constant_shaping_telescopes(distance, name, alpha0, discount):
+    terms = shaping_terms(distance, VARIANTS[name], alpha0=alpha0, discount=discount)
+    expected = alpha0 * (discount**STEPS * phi(name, distance[-1]) - phi(name, distance[0]))
+    assert discounted_sum(terms, discount) == pytest.approx(expected, abs=1e-12 * alpha0)
+
+
+@given(DISTANCES, st.integers(1, 200), st.integers(0, 200), ALPHAS, DISCOUNTS)
+def test_dynamic_form_telescopes_for_a_weight_that_changes(distance, horizon, start, alpha0, discount):
+    decay = Variant(name="d", potential="l2", schedule="linear", horizon=horizon)
+    terms = shaping_terms(distance, decay, alpha0=alpha0, discount=discount, start=start, form="dynamic")
+
+    def weight(t):
+        return alpha0 * max(0, 1 - t / horizon)
+
+    expected = -weight(start + STEPS) * discount**STEPS * distance[-1] + weight(start) * distance[0]
+    assert discounted_sum(terms, discount) == pytest.approx(expected, abs=1e-12 * alpha0)
+
+
+@given(DISTANCES, ALPHAS, st.integers(0, 3000))
+def test_the_forms_differ_by_the_change_of_the_weight(distance, alpha0, start):
+    decay = Variant(name="d", potential="l2", schedule="linear", horizon=2000)
+    paper, dynamic = (
+        shaping_terms(distance, decay, alpha0=alpha0, start=start, form=form) for form in ("paper", "dynamic")
+    )
+    drop = alpha(decay, alpha0, start + np.arange(STEPS)) - alpha(decay, alpha0, start + 1 + np.arange(STEPS))
+    np.testing.assert_allclose(dynamic - paper, 0.99 * drop * distance[1:], atol=1e-13 * alpha0)
+
+
+def test_the_forms_differ_by_five_in_a_hundred_thousand_an_episode_at_200k():
+    decay = Variant(name="decay200k", potential="l2", schedule="linear", horizon=200_000)
+    distance = np.full(STEPS + 1, 0.2)
+    paper, dynamic = (shaping_terms(distance, decay, form=form) for form in ("paper", "dynamic"))
+    assert (dynamic - paper).sum() == pytest.approx(0.99 * 50 * 0.2 / 200_000)
+
+
+@given(DISTANCES, POTENTIALS, ALPHAS)
+def test_paper_form_is_weight_times_discounted_potential_difference_at_every_step(distance, name, alpha0):
+    terms = shaping_terms(distance, VARIANTS[name], alpha0=alpha0, discount=0.9)
+    for t in range(STEPS):
+        expected = alpha0 * (0.9 * phi(name, distance[t + 1]) - phi(name, distance[t]))
+        assert terms[t] == pytest.approx(expected, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("settings", "last"),
+    [
+        ({"episode_end": "terminal", "terminal_potential": "keep"}, 0.9 * -0.1 + 0.2),
+        ({"episode_end": "terminal", "terminal_potential": "zero"}, 0.2),
+        ({"episode_end": "bootstrap", "terminal_potential": "keep"}, 0.9 * -0.1 + 0.2),
+        ({"episode_end": "bootstrap", "terminal_potential": "zero"}, 0.9 * -0.1 + 0.2),
+    ],
+)
+def test_the_last_step_keeps_or_drops_the_potential_reached(settings, last):
+    terms = shaping_terms([0.4, 0.2, 0.1], VARIANTS["l2"], discount=0.9, **settings)
+    np.testing.assert_allclose(terms, [0.9 * -0.2 + 0.4, last])
+
+
+@given(DISTANCES, POTENTIALS, ALPHAS)
+def test_zero_terminal_potential_leaves_only_the_first_potential(distance, name, alpha0):
+    """The condition of policy invariance without bootstrapping (Grzes 2017)."""
+    terms = shaping_terms(distance, VARIANTS[name], alpha0=alpha0, terminal_potential="zero")
+    assert discounted_sum(terms, 0.99) == pytest.approx(-alpha0 * phi(name, distance[0]), abs=1e-12 * alpha0)
+
+
+def test_only_a_lanes_own_last_step_is_an_end():
+    """Two lanes, the second cut after two of three steps."""
+    distance = np.array([[[0.4, 0.3, 0.2, 0.1], [0.4, 0.3, 0.2, 9.0]]])
+    ends = np.array([[False, False, True], [False, True, False]])
+    terms = shaping_reward(
+        distance,
+        np.arange(6).reshape(2, 3),
+        ends,
+        variant=VARIANTS["l2"],
+        alpha0=1.0,
+        discount=1.0,
+        settings=Shaping(terminal_potential="zero"),
+    )
+    np.testing.assert_allclose(terms[0, 0], [0.1, 0.1, 0.2])
+    np.testing.assert_allclose(terms[0, 1, :2], [0.1, 0.3])
+
+
+def test_none_adds_exactly_nothing():
+    assert not shaping_terms(np.linspace(0, 1, 51), VARIANTS["none"], alpha0=1.0).any()
+
+
+@given(st.integers(1, 10**6), ALPHAS)
+def test_linear_schedule_starts_at_alpha0_halves_halfway_and_ends_at_zero_for_good(horizon, alpha0):
+    decay = Variant(name="d", potential="l2", schedule="linear", horizon=horizon)
+    weights = alpha(decay, alpha0, [0, horizon / 2, horizon, horizon + 1, 10 * horizon])
+    np.testing.assert_allclose(weights, [alpha0, alpha0 / 2, 0, 0, 0], atol=1e-15)
+    line = alpha(decay, alpha0, np.linspace(0, 2 * horizon, 50))
+    assert (np.diff(line) <= 0).all()
+    assert (line >= 0).all()
+
+
+@given(ALPHAS)
+def test_constant_schedule_is_alpha0_for_ever(alpha0):
+    assert alpha(VARIANTS["l2"], alpha0, [0, 1, 10**9]).tolist() == [alpha0] * 3
+
+
+def test_an_unknown_potential_is_refused_with_the_allowed_names():
+    with pytest.raises(ValueError, match=r"'l3'.*'none', 'l2', 'l2sq'"):
+        potential("l3", 1.0)

@@ -1,0 +1,229 @@
+"""Faults on the real workflow: whatever is killed, fails or fills up, the next call gives an undisturbed run's bytes.
+
+More moments at which a training process is killed:
+REACHER_SHAPING_KILLS=20 python -m pytest tests/workflow/test_faults.py
+"""
+
+import contextlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from project import Project
+
+from reacher_shaping.storage.files import sha256
+
+KILLS = int(os.environ.get("REACHER_SHAPING_KILLS", "3"))
+TARGET = "results/runs.parquet"
+CELL = "results/paper/l2/61440/alpha1"
+STUDY = {
+    "seeds": 2,
+    "seeds_per_block": 1,
+    "evaluation": {"episodes": 20, "radius": 0.02},
+    "grid": [{"variants": ["l2"], "budgets": [61440]}],
+}
+
+
+def new_project(folder: Path) -> Project:
+    """A study of two blocks that keep a checkpoint after every iteration."""
+    project = Project(folder, STUDY)
+    jobs = folder / "src/reacher_shaping/jobs.py"
+    often = jobs.read_text().replace("SECONDS_PER_CHECKPOINT = 30.0", "SECONDS_PER_CHECKPOINT = 0.0")
+    assert often != jobs.read_text()
+    jobs.write_text(often)
+    return project
+
+
+def made(project: Project) -> dict[str, str]:
+    """Checksums of what a study computes: all its files but those that tell times."""
+    results = project.folder / "results"
+    files = [path for path in results.rglob("*") if path.is_file() and path.suffix in {".pt", ".parquet", ".csv"}]
+    return {str(path.relative_to(results)): sha256(path) for path in files if "/." not in str(path)}
+
+
+def reproduce(project: Project) -> subprocess.CompletedProcess:
+    """What `make reproduce` does, for the blocks and their table."""
+    unlocked = project.python("workflow/unlock.py", ".")
+    assert unlocked.returncode == 0, unlocked.stderr
+    return project.snakemake("--", TARGET)
+
+
+def processes(project: Project, word: str) -> list[int]:
+    """Processes that work in the project with `word` in their command lines."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            here = (process / "cwd").readlink() == project.folder
+            if here and word in (process / "cmdline").read_text():
+                found.append(int(process.name))
+    return found
+
+
+def wait_for(happened, seconds=60.0):
+    """Wait until `happened()` is true and return what it gave."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if value := happened():
+            return value
+        time.sleep(0.02)
+    raise AssertionError("it did not happen")
+
+
+def checkpoints(project: Project) -> list[Path]:
+    return list((project.folder / "results/.checkpoints").glob("*/checkpoint.pt"))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory) -> dict[str, str]:
+    project = new_project(tmp_path_factory.mktemp("undisturbed"))
+    project.run("--", TARGET)
+    found = made(project)
+    assert len(found) == 2 * 4 + 3
+    return found
+
+
+def test_one_core_gives_the_bytes_of_all(project, undisturbed):
+    project.run("--cores", "1", "--", TARGET)
+    assert made(project) == undisturbed
+
+
+@pytest.fixture
+def project(tmp_path) -> Project:
+    return new_project(tmp_path)
+
+
+def assert_whole(project, undisturbed):
+    assert made(project) == undisturbed
+    assert list((project.folder / "results/.checkpoints").iterdir()) == [], "a finished block leaves no checkpoint"
+
+
+def test_training_killed_at_random_moments(project, undisturbed):
+    """A killed job is tried once more by Snakemake itself, and by the next call after that.
+
+    The first kill waits for a checkpoint. A study that ends before all kills are done is checked and begun again.
+    """
+    moments, killed = random.Random(KILLS), 0
+    running = project.start("-m", "snakemake", "--", TARGET)
+    wait_for(lambda: checkpoints(project))
+    while killed < KILLS:
+        for process in processes(project, ".train_block.py")[:1]:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+                killed += 1
+        time.sleep(moments.uniform(0.2, 3))
+        if running.poll() is not None:
+            running.communicate()
+            if running.returncode == 0:
+                assert_whole(project, undisturbed)
+                shutil.rmtree(project.folder / "results")
+            running = project.start("-m", "snakemake", "--", TARGET)
+    running.communicate(timeout=600)
+    done = reproduce(project)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert_whole(project, undisturbed)
+
+
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=["SIGKILL", "SIGTERM", "SIGINT"]
+)
+def test_snakemake_stopped_by_a_signal(project, undisturbed, number):
+    """SIGKILL leaves its jobs alive and its lock behind; `make reproduce` waits for them and says so."""
+    running = project.start("-m", "snakemake", "--", TARGET)
+    wait_for(lambda: checkpoints(project))
+    if number == signal.SIGINT:
+        os.killpg(running.pid, number)  # as Ctrl-C in a terminal does
+    else:
+        running.send_signal(number)
+    running.wait(timeout=120)
+    assert running.returncode != 0
+    running.stdout.close(), running.stderr.close()
+    if number == signal.SIGKILL:
+        assert any((project.folder / ".snakemake/locks").iterdir()), "this kill must leave a lock"
+    done = reproduce(project)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert_whole(project, undisturbed)
+
+
+def test_failure_between_training_and_evaluation_keeps_the_policies_and_shows_nothing_old(project, undisturbed):
+    project.run("--", TARGET)
+    policies = {path: path.stat().st_mtime_ns for path in project.folder.glob(f"{CELL}/*/policy.pt")}
+    assert len(policies) == 2
+    with project.edited("workflow/scripts/evaluate_block.py", "record = Record()", "record = Record(\n1 / 0)"):
+        for _ in range(2):  # the second call must not find the old tables current (snakemake issue 1978)
+            done = project.snakemake("--until", "aggregate_runs")
+            assert done.returncode != 0
+            assert not list(project.folder.glob(f"{CELL}/*/episodes.parquet")), "the old evaluation is gone"
+        assert "the tables in results/ are old" in project.snakemake("--", TARGET).stderr, "said if named alone"
+        assert {"aggregate_runs", "judge_claims", "build_report", "build_crate"} <= set(project.planned())
+        report = project.snakemake("--allowed-rules", "build_report", "--", "report/report.html")
+        assert report.returncode != 0, "no report can be made from half a study"
+    assert {path: path.stat().st_mtime_ns for path in policies} == policies, "nothing was trained again"
+    done = reproduce(project)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert_whole(project, undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("name", "reader"),
+    [("policy.pt", "evaluate_block"), ("progress.parquet", "aggregate_runs"), ("episodes.parquet", "aggregate_runs")],
+)
+@pytest.mark.parametrize("damage", ["truncated", "empty", "flipped", "swapped"])
+def test_damaged_file_is_named_when_it_is_read(finished, tmp_path, name, reader, damage):
+    results, saved = finished.folder / "results", tmp_path / "results"
+    shutil.copytree(results, saved)  # Snakemake deletes what a failed job was to make
+    block, other = (finished.folder / CELL / seeds for seeds in ("seeds0-0", "seeds1-1"))
+    path, content = block / name, (block / name).read_bytes()
+    middle = len(content) // 2
+    path.write_bytes({
+        "truncated": content[:middle],
+        "empty": b"",
+        "flipped": content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :],
+        "swapped": (other / name).read_bytes(),
+    }[damage])  # fmt: skip
+    target = f"{CELL}/seeds0-0/episodes.parquet" if reader == "evaluate_block" else TARGET
+    try:
+        done = finished.snakemake("--forcerun", reader, "--allowed-rules", reader, "--", target)
+    finally:
+        shutil.rmtree(results)
+        shutil.copytree(saved, results)
+    assert done.returncode != 0
+    [said] = [line for line in done.stderr.splitlines() if "ArtifactError" in line]
+    assert f"{CELL}/seeds0-0/{name}: is not the file that" in said
+    assert "delete it and run snakemake again" in said
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Project:
+    project = new_project(tmp_path_factory.mktemp("finished"))
+    project.run("--", TARGET)
+    return project
+
+
+def test_full_disk_loses_no_finished_block(project, undisturbed):
+    """results/ lies on a disk of its own that another program fills up."""
+    results = project.folder / "results"
+    results.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", str(results)], capture_output=True)
+    if mounted.returncode:
+        pytest.skip("mounting a small disk takes root")
+    try:
+        project.run("--", f"{CELL}/seeds0-0/manifest.json")
+        block = made(project)
+        with contextlib.suppress(OSError), (results / "filler").open("wb", buffering=0) as filler:
+            while True:
+                filler.write(bytes(4096))
+        done = project.snakemake("--", TARGET)
+        assert done.returncode != 0
+        assert "No space left on device" in done.stderr
+        assert {name: checksum for name, checksum in made(project).items() if "seeds0-0" in name} == block
+        (results / "filler").unlink()
+        done = reproduce(project)
+        assert done.returncode == 0, done.stderr[-3000:]
+        assert_whole(project, undisturbed)
+    finally:
+        subprocess.run(["umount", "-l", str(results)], check=True)

@@ -1,0 +1,293 @@
+"""The real Snakefile on a copy of the project: one study of toy size is run, then edits are judged by dry runs."""
+
+import zipfile
+
+import pandas as pd
+import pytest
+from project import Project
+from rocrate.rocrate import ROCrate
+
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_json, read_table, sha256
+
+TINY = {
+    "seeds": 2,
+    "seeds_per_block": 1,
+    "evaluation": {"episodes": 20, "radius": 0.02},
+    "grid": [
+        {"variants": ["none"], "budgets": [2048]},
+        {"variants": ["decay200k_l2sq"], "budgets": [2048], "alpha0": [0.5]},
+    ],
+}
+FURTHER = {
+    "seeds": 1,
+    "switches": {
+        "start": "standard", "end": "paper", "settings": {"ends": ["shaping.episode_end"]},
+        "variants": ["none"], "budget": 2048,
+    },
+    "peers": {"seeds": 1, "budgets": {"ppo": 2048}},
+}  # fmt: skip
+NONE, DECAY = "results/paper/none/2048/alpha1", "results/paper/decay200k_l2sq/2048/alpha0.5"
+EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "check_results", "plot_figures"}
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory) -> Project:
+    """The project before anything was run."""
+    return Project(tmp_path_factory.mktemp("empty"), TINY)
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory) -> Project:
+    """The project with its toy study run to the end."""
+    project = Project(tmp_path_factory.mktemp("study"), TINY)
+    project.run()
+    return project
+
+
+def refusal(project: Project) -> str:
+    """What a dry run says of a wrong configuration, less the name of the profile."""
+    done = project.snakemake("--dry-run")
+    assert done.returncode != 0
+    return "\n".join(line for line in done.stderr.splitlines() if "profile" not in line)
+
+
+def test_impossible_value_ends_a_dry_run_with_one_line(empty):
+    with empty.configured(seeds=0):
+        assert refusal(empty) == "ConfigError: config: seeds = 0: should be greater than or equal to 1"
+
+
+def test_unknown_variant_ends_a_dry_run_with_one_line(empty):
+    with empty.configured(grid=[{"variants": ["l3"], "budgets": [2048]}]):
+        said = refusal(empty)
+    assert said.startswith("ConfigError: config: grid.0.variants = 'l3' is unknown; allowed: none, l2, l2sq")
+    assert "\n" not in said
+
+
+def test_empty_configuration_ends_a_dry_run_with_one_line(empty):
+    with empty.replaced("config.yaml", ""):
+        said = refusal(empty)
+    assert "config.yaml: is empty; allowed: a mapping with the keys root_seed, seeds" in said
+    assert "\n" not in said
+
+
+def test_whole_study_makes_every_file_of_the_contract(project):
+    blocks = [f"{cell}/seeds{seed}-{seed}" for cell in (NONE, DECAY) for seed in (0, 1)]
+    files = ["policy.pt", "progress.parquet", "episodes.parquet", "manifest.json"]
+    expected = [f"{block}/{file}" for block in blocks for file in files]
+    expected += [f"{block}/monitor/{block[-1]}.monitor.csv" for block in blocks]
+    expected += [f"results/{name}.parquet" for name in ("runs", "cells", "controllers")]
+    expected += [f"results/{name}.csv" for name in ("correlation", "claims")]
+    expected += [f"results/tables/table_{number}.{kind}" for number in (1, 2, 3) for kind in ("csv", "md")]
+    expected += [f"figures/figure_{number}.{kind}" for number in (1, 2, 3, 4) for kind in ("svg", "pdf")]
+    expected += [f"results/media/paper-none-2048-alpha1.{kind}" for kind in ("gif", "mp4")]
+    expected += ["results/notebooks/story.ipynb", "report/report.html", "ro-crate-metadata.json"]
+    missing = [name for name in expected if not (project.folder / name).exists()]
+    assert missing == []
+
+
+def test_tables_have_the_columns_of_the_contract(project):
+    block = project.folder / f"{DECAY}/seeds1-1"
+    progress = pd.read_parquet(block / "progress.parquet")
+    assert list(progress) == [
+        *["seed", "iteration", "env_steps", "episode_return", "shaped_return", "episode_length", "success_rate"],
+        *["final_distance", "action_std", "entropy", "approx_kl", "clip_fraction", "policy_loss", "value_loss"],
+        "explained_variance",
+        "logged_return",
+    ]
+    assert progress[["seed", "iteration", "env_steps"]].to_numpy().tolist() == [[1, 1, 2048]]
+    episodes = pd.read_parquet(block / "episodes.parquet")
+    assert list(episodes) == [
+        *["seed", "mode", "episode", "episode_return", "reward_distance", "reward_control", "min_distance"],
+        *["final_distance", "first_hit_step", "success", "final_success", "share_within_radius"],
+    ]
+    assert episodes.groupby("mode").size().to_dict() == {"deterministic": 20, "stochastic": 20}
+    runs = pd.read_parquet(project.folder / "results/runs.parquet")
+    assert len(runs) == 4
+    assert {"protocol", "variant", "budget", "alpha0", "seed", "success_rate", "mean_return"} <= set(runs)
+    claims = pd.read_csv(project.folder / "results/claims.csv")
+    assert list(claims) == ["id", "claim", "published", "measured", "ci_low", "ci_high", "test", "verdict"]
+
+
+def test_manifest_holds_the_checksums_of_the_block(project):
+    block = project.folder / f"{NONE}/seeds0-0"
+    manifest = read_json(block / "manifest.json")
+    made = {"policy.pt", "progress.parquet", "episodes.parquet", "monitor/0.monitor.csv"}
+    assert set(manifest["outputs"]) == made
+    for name, checksum in manifest["outputs"].items():
+        assert sha256(block / name) == checksum
+    for key in ("settings", "versions", "git", "machine", "threads", "wall_seconds", "cpu_seconds"):
+        assert manifest[key] is not None
+    assert manifest["env_steps"] == 2048
+    assert manifest["env_steps_per_second"] > 0
+
+
+def test_crate_lists_every_file_of_the_study_and_how_it_came_about(project):
+    crate = ROCrate(project.folder)
+    listed = {entity.id for entity in crate.get_by_type("File")}
+    made = {path for folder in ("results", "figures", "report") for path in (project.folder / folder).rglob("*")}
+    made = {str(path.relative_to(project.folder)) for path in made if path.is_file()}
+    shipped = {f"report/{part}" for part in ("claims.yaml", "report.html.j2")} | {
+        name for name in made if name.startswith(("report/published/", "report/reference/"))
+    }
+    kept_out = {name for name in made if name.startswith(("results/logs/", "results/benchmarks/")) or "/." in name}
+    assert listed == made - shipped - kept_out
+    assert crate.dereference("results/runs.parquet")["sha256"] == sha256(project.folder / "results/runs.parquet")
+    study = crate.dereference("#study")
+    assert study["startTime"] < study["endTime"]
+    assert {package["name"] for package in study["instrument"]} >= {"torch", "mujoco", "snakemake", "reacher-shaping"}
+    settings = read_json(project.folder / study["object"][0].id)
+    assert settings["study"]["seeds"] == 2
+    assert settings["sha256"] in (project.folder / "report/report.html").read_text()
+
+
+def test_archive_packs_the_study_byte_for_byte(project, tmp_path):
+    for name in ("1.zip", "2.zip"):
+        done = project.python("workflow/archive.py", ".", str(tmp_path / name))
+        assert done.returncode == 0, done.stderr
+    assert sha256(tmp_path / "1.zip") == sha256(tmp_path / "2.zip")
+    with zipfile.ZipFile(tmp_path / "1.zip") as packed:
+        packed.extractall(tmp_path / "out")
+    for name in ("report/report.html", f"{NONE}/seeds0-0/manifest.json", "figures/figure_1.svg"):
+        assert (tmp_path / "out" / name).read_bytes() == (project.folder / name).read_bytes()
+    done = project.python("workflow/verify.py", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    listed = len(ROCrate(project.folder).get_by_type("File"))
+    assert done.stdout.strip().endswith(f"and all {listed} of the study's crate.")
+
+
+@pytest.mark.parametrize("name", ["results/claims.csv", "figures/figure_2.svg", f"{NONE}/seeds0-0/episodes.parquet"])
+def test_changed_file_is_named_and_never_archived(project, tmp_path, name):
+    path = project.folder / name
+    content = path.read_bytes()
+    path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    try:
+        done = project.python("workflow/verify.py")
+        assert done.returncode == 1
+        assert done.stdout == f"{name}: has changed since it was made; delete it and run snakemake again\n"
+        done = project.python("workflow/archive.py", ".", str(tmp_path / "study.zip"))
+        assert done.returncode == 1
+        assert name in done.stderr
+        assert not (tmp_path / "study.zip").exists()
+    finally:
+        path.write_bytes(content)
+
+
+def test_no_report_is_made_of_a_changed_table(project, tmp_path):
+    copy = project.copied(tmp_path / "copy")
+    table = copy.folder / "results/claims.csv"
+    table.write_text(table.read_text().replace("untestable", "reproduced", 1))
+    done = copy.snakemake("--allowed-rules", "build_report", "build_crate", "--", "report/report.html")
+    assert done.returncode != 0
+    assert "results/claims.csv: has changed since it was written; delete it and run" in done.stderr
+    assert not (copy.folder / "report/report.html").exists()
+
+
+def test_changed_crate_is_named_and_nothing_is_archived_by_it(project, tmp_path):
+    path = project.folder / "ro-crate-metadata.json"
+    content = path.read_text()
+    try:
+        for old, new in (('"File"', '"Fime"'), ("runs.parquet", "rums.parquet")):
+            path.write_text(content.replace(old, new, 1))
+            for command in (["workflow/verify.py"], ["workflow/archive.py", ".", str(tmp_path / "study.zip")]):
+                done = project.python(*command)
+                assert done.returncode == 1
+                said = (done.stdout + done.stderr).strip()
+                assert said.startswith("ro-crate-metadata.json: has changed since it was written; delete it and run")
+    finally:
+        path.write_text(content)
+
+
+def test_finished_study_has_nothing_to_do(project):
+    assert project.planned() == {}
+
+
+def test_touching_every_source_reruns_nothing(project):
+    for folder in ("src", "workflow", "report", "."):
+        for path in (project.folder / folder).rglob("*") if folder != "." else [project.folder / "config.yaml"]:
+            if path.suffix in {".py", ".smk", ".yaml", ".csv", ".j2"}:
+                path.touch()
+    (project.folder / "Snakefile").touch()
+    assert project.planned() == {}
+
+
+def test_comment_docstring_and_layout_rerun_nothing(project):
+    with (
+        project.edited("src/reacher_shaping/ppo.py", "\n\n\n", "\n\n\n# A comment.\n\n\n"),
+        project.edited("src/reacher_shaping/train.py", '"""Training', '"""The training'),
+        project.edited("workflow/scripts/train_block.py", '"""Train', '"""Now train'),
+        project.edited("config.yaml", "seeds:", "# A comment.\nseeds:"),
+    ):
+        assert project.planned() == {}
+
+
+def test_edit_of_the_update_retrains_every_block(project):
+    with project.edited("src/reacher_shaping/ppo.py", "BETAS = (0.9, 0.999)", "BETAS = (0.9, 0.99)"):
+        jobs = project.planned()
+    assert len([name for name in jobs["train_block"] if name.endswith("policy.pt")]) == 4
+
+
+def test_edit_of_a_plot_redraws_and_does_not_train(project):
+    with project.edited("src/reacher_shaping/plots.py", "\n\n\n@mpl", "\n\n\ndef _new():\n    pass\n\n\n@mpl"):
+        assert project.planned() == {}
+    with project.edited("src/reacher_shaping/plots.py", '"PPO iteration"', '"Iteration"'):
+        jobs = project.planned()
+    shown = {"plot_figures", "build_report", "build_crate"}
+    assert shown <= set(jobs) <= shown | {"run_notebook"}
+
+
+def test_setting_of_one_cell_reruns_that_cell_and_what_depends_on_it(project):
+    grid = [TINY["grid"][0] | {"ppo": {"learning_rate": 0.001}}, TINY["grid"][1]]
+    with project.configured(grid=grid):
+        jobs = project.planned()
+    for rule in ("train_block", "evaluate_block", "render_media"):
+        assert jobs[rule]
+        assert all("none" in name for name in jobs[rule])
+    assert len([name for name in jobs["train_block"] if name.endswith("policy.pt")]) == 2
+    assert EVALUATION | {"build_report", "run_notebook", "format_tables"} <= set(jobs)
+    assert "evaluate_controllers" not in jobs
+
+
+def test_evaluation_setting_evaluates_again_without_training(project):
+    with project.configured(evaluation={"episodes": 21, "radius": 0.02}):
+        jobs = project.planned()
+    assert "train_block" not in jobs
+    assert len([name for name in jobs["evaluate_block"] if name.endswith("episodes.parquet")]) == 4
+
+
+def test_more_seeds_train_only_the_new_blocks(project):
+    with project.configured(seeds=3):
+        jobs = project.planned()
+    trained = sorted(name for name in jobs["train_block"] if name.endswith("policy.pt"))
+    assert trained == [f"{DECAY}/seeds2-2/policy.pt", f"{NONE}/seeds2-2/policy.pt"]
+    assert all("seeds2-2" in name for name in jobs["evaluate_block"])
+    assert "render_media" not in jobs
+
+
+def test_block_made_again_has_the_same_bytes_and_reruns_nothing_else(project):
+    block = project.folder / f"{NONE}/seeds1-1"
+    names = ["policy.pt", "progress.parquet", "monitor"]
+    before = {name: sha256(block / name) for name in names}
+    project.run("--force", "--", f"{NONE}/seeds1-1/policy.pt")
+    assert {name: sha256(block / name) for name in names} == before
+    assert set(project.planned()) == {"build_crate"}, "it lists the file that tells when the block was trained"
+
+
+def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp_path):
+    copy = project.copied(tmp_path / "copy")
+    with copy.configured(experiments={"mine": FURTHER}):
+        assert "aggregate_experiment" not in copy.planned()  # a plain call is the main study alone
+        shared = copy.planned("mine")["train_block"]
+        assert not [path for path in shared if path.startswith(f"{NONE}/seeds0-0/")]  # trained for the main study
+        copy.run("mine")
+        folder = copy.folder / "results/experiments/mine"
+        effects = read_table(folder / "effects.csv", schemas.EFFECTS)
+        assert set(effects["effect"]) == {"all", "alone", "last", "interaction"}
+        assert len(read_table(folder / "agreement.csv", schemas.AGREEMENT)) == 8
+        runs = read_table(folder / "runs.parquet", schemas.RUNS)
+        assert set(runs["protocol"]) == {"standard", "paper", "standard_with_ends", "paper_without_ends"}
+        assert copy.planned("mine") == {}
+        copy.run("--allowed-rules", "build_report", "--", "report/report.html")
+        page = (copy.folder / "report/report.html").read_text()
+        assert '<h3 id="mine">Mine</h3>' in page
+        assert 'id="mine_effects"' in page
