@@ -97,8 +97,8 @@ def _inputs(folder, study, grid, seeds, **changes):
         "peers": synthetic.peers(), "figures": paths,
         "media": sorted((folder / "media").iterdir()), "manifests": [MANIFEST] * 3,
         "notebooks": [folder / "results" / "notebooks" / "story.ipynb"], "settings_hash": "ab" * 32,
-        "ledger": [{"id": "C1", "evidence": "thirteen of fifteen", "shown_in": ["figure_2", "figure_9"]}],
-        "folder": folder / "report", "template": ROOT / "report" / "report.html.j2",
+        "ledger": [{"id": "C1", "evidence": "thirteen of fifteen", "shown_in": ["figure_2", "figure_4"]}],
+        "folder": folder / "report", "template": html.TEMPLATE,
     }  # fmt: skip
     return html.Inputs(**(given | changes))
 
@@ -239,7 +239,7 @@ def test_manifests_are_summed(page):
 
 def test_no_result_stands_in_the_template():
     """Every number with decimals in the template's prose would be a typed-in result."""
-    source = (ROOT / "report" / "report.html.j2").read_text(encoding="utf-8")
+    source = (html.TEMPLATE).read_text(encoding="utf-8")
     body = re.sub(r"<style>.*?</style>|<script>.*?</script>|\{[{%].*?[%}]\}|<[^>]*>", " ", source, flags=re.DOTALL)
     prose = body.split("References")[0]
     assert not re.findall(r"\d+\.\d+|\d+\s*%|\d{3,}", re.sub(r"\(Ng et al\. 1999\)", "", prose))

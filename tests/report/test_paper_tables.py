@@ -92,7 +92,7 @@ def test_toy_grid_has_no_published_values_and_says_so(published):
     table = paper_tables.table_2(toy, published)
     assert table["published_success_rate"].isna().all()
     assert "| \N{EN DASH} |" in paper_tables.to_markdown(table, "Toy.")
-    assert "no such cells in this study" in paper_tables.to_markdown(paper_tables.table_3(toy, published), "Toy.")
+    assert "No such cells in this study." in paper_tables.to_markdown(paper_tables.table_3(toy, published), "Toy.")
 
 
 def test_diverged_runs_are_counted_where_people_look(cells, published):

@@ -28,5 +28,5 @@ def test_markdown_has_a_line_per_row_and_says_when_there_is_none():
     grid = text_tables.Grid(["Variant", "Seeds"], [["L2", "3"]])
     assert text_tables.to_markdown(grid) == "| Variant | Seeds |\n| :-- | --: |\n| L2 | 3 |"
     assert text_tables.to_markdown(text_tables.Grid(["Variant", "Seeds"], [])).endswith(
-        "| no such cells in this study |  |"
+        "| No such cells in this study. |  |"
     )

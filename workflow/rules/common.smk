@@ -22,6 +22,9 @@ def source(path):
     return os.path.relpath(HERE / path)
 
 
+WORDS = source("src/reacher_shaping/report/text.yaml")
+
+
 def code(script):
     """Hash of the code a script runs: a param, so that an edit of that code and nothing else reruns its jobs."""
     return code_hash(HERE / "workflow/scripts" / f"{script}.py")

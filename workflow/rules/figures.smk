@@ -64,6 +64,7 @@ rule format_tables:
         **PUBLISHED,
         runs="results/runs.parquet",
         cells="results/cells.parquet",
+        words=WORDS,
     output:
         FORMATTED_TABLES,
     log:

@@ -8,6 +8,7 @@ rule run_notebook:
         TABLES,
         MADE_TABLES,
         **PUBLISHED,
+        words=WORDS,
         source=lambda wildcards: NOTEBOOK_SOURCES[wildcards.notebook],
     output:
         "results/notebooks/{notebook}.ipynb",

@@ -25,7 +25,8 @@ rule build_report:
         media=MEDIA,
         notebooks=NOTEBOOKS,
         manifests=expand("{block}/manifest.json", block=BLOCKS),
-        template=source("report/report.html.j2"),
+        template=source("src/reacher_shaping/report/report.html.j2"),
+        words=WORDS,
     output:
         "report/report.html",
     log:
@@ -66,7 +67,8 @@ use rule build_report as build_reference_report with:
         media=[],
         notebooks=NOTEBOOKS,
         manifests=source("report/reference/manifest.json"),
-        template=source("report/report.html.j2"),
+        template=source("src/reacher_shaping/report/report.html.j2"),
+        words=WORDS,
     output:
         "report/reference.html",
     log:

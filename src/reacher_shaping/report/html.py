@@ -15,6 +15,7 @@ from reacher_shaping.analysis.baselines import ALGORITHMS, by_algorithm, peer_ta
 from reacher_shaping.labels import budget_label, cell_order, of_protocol, setting_label, variant_label
 from reacher_shaping.report import captions, paper_tables, seed_uncertainty, study_sections
 from reacher_shaping.report.summary import effect, short_number, summary
+from reacher_shaping.report.text import say
 from reacher_shaping.report.text_tables import (
     Grid,
     controllers_grid,
@@ -25,6 +26,7 @@ from reacher_shaping.report.text_tables import (
 )
 from reacher_shaping.settings.base import plain
 
+TEMPLATE = Path(__file__).with_name("report.html.j2")
 MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
 MEDIA_BUDGET = 11_000_000  # bytes of videos put into the file; the rest are links
 MANIFEST_NUMBERS = ("env_steps", "wall_seconds", "cpu_seconds", "env_steps_per_second")
@@ -67,7 +69,7 @@ class Inputs:
     settings_hash: str = ""
     protocol: str | None = None
     folder: Path = Path("report")
-    template: Path = Path("report/report.html.j2")
+    template: Path = TEMPLATE
 
 
 @dataclass(frozen=True)
@@ -197,7 +199,7 @@ def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
         source = data_uri(path) if size <= left else _link(path, inputs)
         left -= size if size <= left else 0
         title = f"{variant_label(str(row['variant']))}, {setting_label(int(row['budget']), row['alpha0'])}"
-        caption = f"success rate of the cell {100 * row['success_rate']:.1f}\N{NO-BREAK SPACE}%"
+        caption = say("computation.video", rate=f"{100 * row['success_rate']:.1f}\N{NO-BREAK SPACE}%")
         kind = "video" if path.suffix == ".mp4" else "image"
         shown.append(Picture(stem, title, caption, source, {path.suffix[1:].upper(): _link(path, inputs)}, kind))
     return shown
@@ -224,34 +226,36 @@ def computation(inputs: Inputs) -> Grid | None:
     if not inputs.manifests:
         return None
     several = {
-        "Code": [_commit(manifest.get("git", {})) for manifest in inputs.manifests],
-        "Machine": [_machine(manifest.get("machine", {})) for manifest in inputs.manifests],
-        "Threads per job": [str(manifest.get("threads", "")) for manifest in inputs.manifests],
+        "code": [_commit(manifest.get("git", {})) for manifest in inputs.manifests],
+        "machine": [_machine(manifest.get("machine", {})) for manifest in inputs.manifests],
+        "threads": [str(manifest.get("threads", "")) for manifest in inputs.manifests],
     }
     frame = pd.DataFrame([{name: row.get(name, np.nan) for name in MANIFEST_NUMBERS} for row in inputs.manifests])
     total = frame.sum()
     speed = frame["env_steps_per_second"].quantile([0.0, 0.5, 1.0]).tolist()
-    rows = [[name, "; ".join(dict.fromkeys(values))] for name, values in several.items()]
+    rows = [[say(f"computation.{name}"), "; ".join(dict.fromkeys(values))] for name, values in several.items()]
     rows += [
-        ["Training jobs", f"{len(frame):,}"],
-        ["Environment steps", f"{total['env_steps']:,.0f}"],
+        [say("computation.jobs"), f"{len(frame):,}"],
+        [say("computation.steps"), f"{total['env_steps']:,.0f}"],
         [
-            "Training time, all jobs",
-            f"{total['wall_seconds'] / 3600:.2f} h wall, {total['cpu_seconds'] / 3600:.2f} h CPU",
+            say("computation.time"),
+            say("computation.hours", wall=total["wall_seconds"] / 3600, cpu=total["cpu_seconds"] / 3600),
         ],
-        ["Steps per second of a job", f"{speed[1]:,.0f} (median; {speed[0]:,.0f} to {speed[2]:,.0f})"],
+        [say("computation.speed"), say("computation.speeds", least=speed[0], median=speed[1], most=speed[2])],
     ]
     packages: dict[str, dict[str, None]] = {}
     for manifest in inputs.manifests:
         for name, version in manifest.get("versions", {}).items():
             packages.setdefault(name, {})[str(version)] = None
-    rows.append(["Versions", ", ".join(f"{name} {' / '.join(found)}" for name, found in packages.items())])
+    rows.append(
+        [say("computation.versions"), ", ".join(f"{name} {' / '.join(found)}" for name, found in packages.items())]
+    )
     return Grid(["", ""], rows, frozenset({0, 1}))
 
 
 def _commit(git: Mapping[str, Any]) -> str:
-    commit = str(git.get("commit") or "not under version control")[:12]
-    return f"{commit} with uncommitted changes" if git.get("dirty") else commit
+    commit = str(git.get("commit") or say("computation.no_commit"))[:12]
+    return say("computation.dirty", commit=commit) if git.get("dirty") else commit
 
 
 def _machine(machine: Mapping[str, Any]) -> str:
@@ -264,4 +268,4 @@ def budgets_sentence(peers: pd.DataFrame) -> str:
         f"{ALGORITHMS.get(name, name)} {budget_label(int(budget))} ({len(own)} seed{'s' if len(own) != 1 else ''})"
         for (name, budget), own in by_algorithm(peers)
     ]
-    return f"Environment steps of training: {', '.join(parts)}."
+    return say("computation.budgets", budgets=", ".join(parts))

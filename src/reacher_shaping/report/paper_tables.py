@@ -1,11 +1,13 @@
 """Tables of cells: the paper's three with the published values beside ours, and two of measures the paper lacks."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from reacher_shaping.labels import budget_label, cell_order, in_groups, number, of_protocol, variant_label
+from reacher_shaping.report.text import entry, say
 from reacher_shaping.storage.files import write_text
 
 CELL = ["variant", "budget", "alpha0"]
@@ -22,32 +24,7 @@ BEHAVIOUR = (
 )
 LEARNING = ("steps_to_threshold", "area_under_curve", "drop_from_peak", "roughness")
 # Column -> its heading, in the order of a readable table.
-HEADINGS = {
-    "rank": "Rank",
-    "policy": "Policy",
-    "variant": "Variant",
-    "budget": "Budget (steps)",
-    "alpha0": "α₀",
-    "seeds": "Seeds",
-    "success_rate": "Success rate [95 % interval]",
-    "published_success_rate": "published",
-    "published_rank": "published rank",
-    "mean_return": "Mean return [95 % interval]",
-    "published_mean_return": "published",
-    "final_success_rate": "Success at the last step",
-    "share_within_radius": "Share of steps within the radius",
-    "first_hit_step": "Step of the first hit",
-    "final_distance": "Distance at the last step (mm)",
-    "reward_distance": "Return: distance",
-    "reward_control": "Return: control cost",
-    "steps_to_threshold": "Steps to the threshold (thousands)",
-    "reached": "reached by",
-    "area_under_curve": "Mean return while training",
-    "drop_from_peak": "Drop from the peak",
-    "roughness": "Roughness",
-    "deterministic_success_rate": "Success, mean action",
-    "deterministic_mean_return": "Mean return, mean action",
-}
+HEADINGS: Mapping[str, str] = entry("headings")
 # Decimals and factor where they differ from 3 and 1.
 FORMATS = {
     "final_distance": (1, 1000.0),
@@ -187,7 +164,7 @@ def to_markdown(frame: pd.DataFrame, caption: str) -> str:
     lines.append("|" + "|".join(" :-- " if name in text_columns else " --: " for name in shown.columns) + "|")
     lines += ["| " + " | ".join(row) + " |" for row in shown.itertuples(index=False)]
     if shown.empty:
-        lines.append("| no such cells in this study |" + " |" * (len(shown.columns) - 1))
+        lines.append(f"| {say('tables.none')} |" + " |" * (len(shown.columns) - 1))
     return f"{caption}\n\n" + "\n".join(lines) + "\n"
 
 

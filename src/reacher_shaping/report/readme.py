@@ -9,6 +9,7 @@ import pandas as pd
 
 from reacher_shaping.report import paper_tables, study_sections
 from reacher_shaping.report.summary import summary
+from reacher_shaping.report.text import entry, say
 from reacher_shaping.storage.files import read_studies
 from reacher_shaping.storage.reference import _spent
 
@@ -18,7 +19,7 @@ _BLOCK = re.compile(r"(<!-- reference: begin -->\n).*(<!-- reference: end -->)",
 def sections(kept: Path, training_logs: pd.DataFrame) -> list[study_sections.Section]:
     """Return what the report says of the further studies kept in a folder. Raises ArtifactError."""
     given = read_studies(str(path) for path in sorted(kept.glob("experiments/*/*.*")))
-    order = [*(name for name in study_sections.TITLES if name in given), *(given.keys() - study_sections.TITLES)]
+    order = [*(name for name in entry("studies") if name in given), *sorted(given.keys() - entry("studies"))]
     return [study_sections.section(name, given[name], training_logs) for name in order]
 
 
@@ -36,14 +37,14 @@ def headline(
     """
     answered = summary(cells, claims)
     questions = [f"- {answer.question} **{answer.short}**" for answer in answered.answers]
-    table = paper_tables.to_markdown(paper_tables.table_1(cells, published), "The six best cells of the main grid:")
-    picture = f"![Success rate of every cell, with intervals and the published values]({figure})"
+    table = paper_tables.to_markdown(paper_tables.table_1(cells, published), say("readme.table"))
+    picture = f"![{say('readme.picture')}]({figure})"
     studies = [
         f"- **{own.title.rstrip('?')}.** {' '.join(own.sentences)} {_took(record['experiments'][own.name])}"
         for own in further
     ]
     parts = [" ".join(answered.headline), "\n".join(questions), picture, table.strip()]
-    parts += ["The further studies:", "\n".join(studies)] if studies else []
+    parts += [say("readme.studies"), "\n".join(studies)] if studies else []
     parts.append(_facts(record))
     return "\n\n".join(parts) + "\n"
 
@@ -54,10 +55,8 @@ def _facts(record: Mapping[str, Any]) -> str:
     seeds = sorted({seed for block in blocks for seed in block["seeds"]})
     commits = ", ".join(sorted({str(block["git"]["commit"])[:12] for block in blocks}))
     steps, hours = _spent(blocks)
-    return (
-        f"The reference run: {len(seeds)} seeds a cell, {steps / 1e6:.0f} million environment steps of training in "
-        f"{hours:.1f} core hours, code {commits}; its tables and manifest are in `report/reference/`."
-    ) + _further_facts(record)
+    facts = say("readme.facts", seeds=len(seeds), steps=steps / 1e6, hours=hours, code=commits)
+    return facts + _further_facts(record)
 
 
 def _further_facts(record: Mapping[str, Any]) -> str:
@@ -68,19 +67,16 @@ def _further_facts(record: Mapping[str, Any]) -> str:
     text = ""
     if blocks:
         steps, hours = _spent(list(blocks.values()))
-        text += (
-            f" Its further studies took {steps / 1e6:.0f} million steps more, in {hours:.1f} core hours; what several "
-            "share is counted once here."
-        )
+        text += f" {say('readme.further', steps=steps / 1e6, hours=hours)}"
     if record.get("peers"):
-        text += f" The peers took {_spent(record['peers'])[1]:.1f} core hours."
+        text += f" {say('readme.peers', hours=_spent(record['peers'])[1])}"
     return text
 
 
 def _took(blocks: Sequence[Mapping[str, Any]]) -> str:
     """Say what the blocks of one further study took, those included that another study trained."""
     steps, hours = _spent(blocks)
-    return f"Training: {steps / 1e6:.0f} million steps, {60 * hours:.0f} core minutes."
+    return say("readme.took", steps=steps / 1e6, minutes=60 * hours)
 
 
 def put_headline(readme: str, text: str) -> str:

@@ -10,26 +10,17 @@ import pandas as pd
 
 from reacher_shaping.analysis import single_seed_studies
 from reacher_shaping.labels import budget_label, cell_order, number, of_protocol, setting_label, variant_label
+from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid
 
 POWER = 0.8  # chance to see an effect that counts as enough, as `power.parquet` has it
 MOST = 10_000  # seeds up to which `stats.seeds_needed` looks
-CELL_HEADINGS = ["Variant", "Budget (steps)", "α₀"]
-QUANTITIES = {
-    "best_success": "Success rate of the best cell",
-    "ratio": "Best cell over none at the longer budget",
-    "r_alpha_return": "r(α₀, return)",
-    "r_success_return": "r(success, return)",
-    "r_success_budget": "r(success, budget)",
-}
+CELL_HEADINGS = [say(f"headings.{name}") for name in ("variant", "budget", "alpha0")]
 
 
 def power_grid(power: pd.DataFrame, protocol: str | None = None) -> Grid:
     """A row per shaped cell of the table of powers: published gain, our deviation, power, and the seeds it takes."""
-    headings = [
-        *CELL_HEADINGS, "Published gain over none", "Deviation of our paired differences", "Seeds", "Power with these",
-        "Power with 3", f"Seeds for a power of {POWER:g}",
-    ]  # fmt: skip
+    headings = [*CELL_HEADINGS, *(text.format(power=POWER) for text in entry("tables.power"))]
     rows = [
         [
             *_cell(row),
@@ -49,34 +40,24 @@ def power_sentence(power: pd.DataFrame, protocol: str | None = None) -> str:
     """What the table of powers says: in how many cells the published gain could be told from chance."""
     known = of_protocol(power, protocol).dropna(subset="deviation")
     if known.empty:
-        return "How many seeds the published gains take cannot be said: no cell has two seeds and a published gain."
+        return say("seeds.power_unknown")
     seeds = sorted(known["seeds"].unique())
-    ours = f"{seeds[0]:.0f}" if len(seeds) == 1 else f"{seeds[0]:.0f} to {seeds[-1]:.0f}"
+    ours = f"{seeds[0]:.0f}" if len(seeds) == 1 else _span(f"{seeds[0]:.0f}", f"{seeds[-1]:.0f}")
     middle = float(np.median(known["seeds_needed"].fillna(np.inf)))
-    needed = f"{np.ceil(middle):,.0f}" if np.isfinite(middle) else f"more than {MOST:,}"
+    needed = f"{np.ceil(middle):,.0f}" if np.isfinite(middle) else say("seeds.more_than", count=f"{MOST:,}")
     enough, three = ((known[name] >= POWER).sum() for name in ("power", "power_3"))
-    return (
-        f"If the published gains over none were true, a paired test with the {ours} seeds of this study would have a "
-        f"power of {POWER:g} or more in {enough} of {len(known)} cells, and with 3 seeds in {three}; the median cell "
-        f"takes {needed} seeds."
-    )
+    return say("seeds.power", ours=ours, power=POWER, enough=enough, cells=len(known), three=three, needed=needed)
 
 
 def _needed(row: dict[Any, Any]) -> str:
     if not np.isfinite(row["deviation"]):
         return _text(np.nan)
-    return f"{row['seeds_needed']:,.0f}" if np.isfinite(row["seeds_needed"]) else f"over {MOST:,}"
+    return f"{row['seeds_needed']:,.0f}" if np.isfinite(row["seeds_needed"]) else say("seeds.over", count=f"{MOST:,}")
 
 
 def variance_grid(variance: pd.DataFrame, protocol: str | None = None) -> Grid:
     """A row per cell: standard deviations of the success rate from seeds and from evaluation, and the seeds' share."""
-    headings = [
-        *CELL_HEADINGS,
-        "Seeds",
-        "Deviation from seeds",
-        "Deviation from evaluation",
-        "Seeds' share of variance",
-    ]
+    headings = [*CELL_HEADINGS, *entry("tables.variance")]
     rows = [
         [
             *_cell(row),
@@ -95,14 +76,12 @@ def variance_sentence(variance: pd.DataFrame, protocol: str | None = None) -> st
     shares = np.array([_share(row) for row in _sorted(of_protocol(variance, protocol))], dtype=float)
     shares = shares[np.isfinite(shares)]
     if not shares.size:
-        return "One seed per cell cannot tell the differences between seeds from the noise of the evaluation."
+        return say("seeds.variance_unknown")
     middle = float(np.median(shares))
-    more, other = ("seeds", "evaluation episodes") if middle > 0.5 else ("evaluation episodes", "seeds")
-    return (
-        f"In the median cell {_percent(middle)} of the variance of the success rate over runs is between seeds "
-        f"({_percent(shares.min())} to {_percent(shares.max())}) and the rest is noise of the evaluation: more {more}, "
-        f"rather than more {other}, would narrow the intervals."
-    )
+    sources = entry("seeds.sources")
+    more, other = sources if middle > 0.5 else reversed(sources)
+    least, most = _percent(shares.min()), _percent(shares.max())
+    return say("seeds.variance", middle=_percent(middle), least=least, most=most, more=more, other=other)
 
 
 def _share(row: dict[Any, Any]) -> float:
@@ -113,19 +92,16 @@ def _share(row: dict[Any, Any]) -> float:
 def winners_grid(winners: pd.DataFrame) -> Grid:
     """How often each cell is the best of a study with one seed per cell, most often first."""
     rows = [[*_cell(row), _percent(row["share"], 1)] for row in winners.to_dict("records")]
-    return Grid([*CELL_HEADINGS, "Best cell in"], rows)
+    return Grid([*CELL_HEADINGS, *entry("tables.winners")], rows)
 
 
 def winners_sentence(winners: pd.DataFrame) -> str:
     """Which cell would win most often, and how far that is from always."""
     if winners.empty:
-        return "The study lacks cells that the lottery takes."
+        return say("seeds.winners_unknown")
     first = winners.sort_values("share", ascending=False).iloc[0]
     name = f"{variant_label(str(first['variant']))} ({setting_label(int(first['budget']), float(first['alpha0']))})"
-    return (
-        f"With one seed per cell, {len(winners)} cells could have come out best, the most frequent of them, {name}, "
-        f"in {_percent(first['share'], 1)} of such studies."
-    )
+    return say("seeds.winners", cells=len(winners), name=name, share=_percent(first["share"], 1))
 
 
 def spread_grid(spread: pd.DataFrame, published: pd.DataFrame) -> Grid:
@@ -140,9 +116,14 @@ def spread_grid(spread: pd.DataFrame, published: pd.DataFrame) -> Grid:
     for row in spread.to_dict("records"):
         name = row["quantity"]
         values = [row[level] for level in levels] + [theirs.get(name, np.nan)]
-        rows.append([QUANTITIES.get(name, name), *(_text(value, 2) for value in values)])
+        rows.append([entry("quantities").get(name, name), *(_text(value, 2) for value in values)])
     headings = [f"{level.removeprefix('q').lstrip('0')} %" for level in levels]
-    return Grid(["Quantity", *headings, "published"], rows)
+    first, last = entry("tables.spread")
+    return Grid([first, *headings, last], rows)
+
+
+def _span(first: str, last: str) -> str:
+    return say("seeds.span", first=first, last=last)
 
 
 def _sorted(frame: pd.DataFrame) -> list[dict[Any, Any]]:

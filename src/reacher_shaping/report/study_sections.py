@@ -16,37 +16,12 @@ from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.labels import setting_label, variant_label
 from reacher_shaping.report import study_tables, text_tables
-from reacher_shaping.report.study_tables import METRICS, NAMES, SHAPING, decimals, interval, p_value
+from reacher_shaping.report.study_tables import METRICS, SHAPING, decimals, interval, p_value
+from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid
 from reacher_shaping.settings import outputs
 
 LEVEL = 0.05
-TITLES = {
-    "released": "The study as the released code computes it",
-    "attribution": "What each departure does",
-    "standard": "Does shaping help once PPO works?",
-    "tuned": "How good can it get?",
-    "ablation": "What made the difference",
-}
-INTROS = {
-    "released": "The text and the code released with it differ in a few places, as easily happens: the weight of the "
-    "control cost (D1), an axis too many that pairs every new probability of a minibatch with every old one (D2), a "
-    "recursion whose carry is not stored, so that advantages look one step ahead (D3), a learning rate that changes "
-    "with a late commit (D4), a log of the shaped return over the last ten episodes (D5), the potential under a decay "
-    "(D6), and a start weight α₀ that is a label: every run starts at 1 (D7). Here the published runs are trained as "
-    "that code trains them, labels as published; the runs labelled 0.5 have the late commit's learning rate and, where "
-    "their weight decays, its potential L2². So the appendix's runs of 500K would be those of the main table labelled "
-    "0.5, number for number, and are not trained twice.",
-    "attribution": "Both ends and, between them, every switch alone from the text, and taken back alone from the "
-    "release. If switches acted independently, the two would agree.",
-    "standard": "The same variants under settings that are usual for PPO on this task: a network each for policy and "
-    "value, orthogonal first weights, clipped actions, values bootstrapped at the time limit, no entropy bonus.",
-    "tuned": "Settings of PPO and shaping that a search on seeds of its own found, trained on fresh seeds, with and "
-    "without the shaping.",
-    "ablation": "From usual settings to the tuned ones, both shaped, and the tuned ones with each part of the change "
-    "taken back.",
-}
-SHORT = {"success_rate": "success", "unit_return": "return", "final_distance": "distance"}
 
 
 @dataclass(frozen=True)
@@ -80,41 +55,26 @@ def section(
         said.append(best_sentence(given["cells"]))
     if "effects" in shown:
         said.append(effects_sentence(given["effects"]))
-        found[
-            "What each switch does, mean over seeds [95 % interval]; p is Holm-corrected over the rows of one kind of "
-            "effect"
-        ] = study_tables.effects(given["effects"])
+        found[say("study_tables.effects")] = study_tables.effects(given["effects"])
     if "correlation" in shown:
         said.append(correlation_sentence(given["correlation"]))
-        found["Pearson's correlation over cells [95 % bootstrap interval], and its range over studies of one seed"] = (
-            study_tables.correlation(given["correlation"], main)
-        )
+        found[say("study_tables.correlation")] = study_tables.correlation(given["correlation"], main)
         if published is not None:
-            found["Every published run, one seed, and ours of the same label, mean over seeds [95 % interval]"] = (
-                study_tables.beside(given["cells"], published)
-            )
+            found[say("study_tables.beside")] = study_tables.beside(given["cells"], published)
     if "log" in shown:
-        found[
-            f"What the protocol's own log shows while training, its moving average over {WINDOW} iterations, mean over "
-            "seeds [least, greatest]; the last column is the standard deviation of the torques at the end. Below, "
-            "published runs of the same cells"
-        ] = study_tables.logs(given["logs"], training_logs)
+        found[say("study_tables.logs", window=WINDOW)] = study_tables.logs(given["logs"], training_logs)
     if "agreement" in given:
         said.append(agreement_sentence(given["agreement"]))
-        found["Beside Stable-Baselines3 with the same settings: means, and Welch's interval of the difference"] = (
-            study_tables.agreement(given["agreement"])
-        )
+        found[say("study_tables.agreement")] = study_tables.agreement(given["agreement"])
     shaped = given["comparisons"][given["comparisons"]["family"] == "none"]
     if "effects" not in shown and len(shaped):
         said.append(shaping_sentence(shaped))
-        family = "a row" if only_cell(shaped) else "a column"
-        found[f"Paired differences to none, mean over seeds [95 % interval]; p is Holm-corrected over {family}"] = (
-            study_tables.shaping(corrected(shaped, SHAPING))
-        )
-    found["Every cell, mean over seeds [95 % interval]"] = study_tables.cells(given["cells"])
-    title = TITLES.get(name, protocol_label(name).capitalize())
+        family = "row" if only_cell(shaped) else "column"
+        found[say(f"study_tables.shaping_{family}")] = study_tables.shaping(corrected(shaped, SHAPING))
+    found[say("study_tables.cells")] = study_tables.cells(given["cells"])
+    words = entry("studies").get(name, {"title": protocol_label(name).capitalize(), "intro": ""})
     figures = [f"{name}_{view}" for view in shown]
-    return Section(name, title, INTROS.get(name, ""), [text for text in said if text], found, figures)
+    return Section(name, words["title"], words["intro"], [text for text in said if text], found, figures)
 
 
 def document(
@@ -136,8 +96,9 @@ def document(
     return "\n\n".join(part for part in parts if part)
 
 
-def within(heading: str) -> str:
-    """A heading as it stands within a sentence."""
+def within(metric: str) -> str:
+    """A measure's name as it stands within a sentence."""
+    heading = say(f"measures.{metric}")
     return heading[0].lower() + heading[1:]
 
 
@@ -146,11 +107,11 @@ def best_sentence(cells: pd.DataFrame) -> str:
     row = cells.sort_values("success_rate", ascending=False).iloc[0].to_dict()
     name = f"{protocol_label(row['protocol'])}, {variant_label(row['variant'])}"
     texts = [
-        f"{within(NAMES[metric])} {interval(row, metric, f'{metric}_low', f'{metric}_high', *decimals(metric))}"
+        f"{within(metric)} {interval(row, metric, f'{metric}_low', f'{metric}_high', *decimals(metric))}"
         for metric in ("success_rate", "final_success_rate", "mean_return")
     ]
     setting = setting_label(int(row["budget"]), row["alpha0"])
-    return f"The cell with the highest success rate is {name} ({setting}): {'; '.join(texts)}."
+    return say("study_sentences.best", cell=name, setting=setting, measures="; ".join(texts))
 
 
 def effects_sentence(effects: pd.DataFrame) -> str:
@@ -163,53 +124,61 @@ def effects_sentence(effects: pd.DataFrame) -> str:
         if single.empty:
             continue
         row = single.iloc[int(single["difference"].abs().to_numpy().argmax())].to_dict()
+        difference = interval(row, "difference", "ci_low", "ci_high", digits, factor)
         parts.append(
-            f"{within(NAMES[metric])}: {switch_label(row)} "
-            f"({variant_label(row['variant'])}, {KINDS[row['effect']]}), "
-            f"{interval(row, 'difference', 'ci_low', 'ci_high', digits, factor)}"
+            say(
+                "study_sentences.effect",
+                measure=within(metric),
+                switch=switch_label(row),
+                variant=variant_label(row["variant"]),
+                kind=KINDS[row["effect"]],
+                difference=difference,
+            )
         )
-    text = f"The largest effect of one switch on each measure: {'; '.join(parts)}." if parts else ""
+    text = say("study_sentences.effects", effects="; ".join(parts)) if parts else ""
     found = effects[(effects["effect"] == "interaction") & (effects["p_holm"] < LEVEL)]
     if not (effects["effect"] == "interaction").any():
         return text
     found = found[found["metric"].isin(METRICS)]
     if found.empty:
-        return f"{text} No switch's effect depends on the others beyond chance."
+        return f"{text} {say('study_sentences.no_interaction')}"
     parts = []
     for switch, own in found.groupby("switch"):
-        parts.append(
-            f"{protocol_label(str(switch))} ({', '.join(dict.fromkeys(SHORT[name] for name in own['metric']))})"
-        )
-    return f"{text} What a switch does depends on the others beyond chance for {', '.join(parts)}."
+        measures = dict.fromkeys(entry("short_measures")[name] for name in own["metric"])
+        parts.append(f"{protocol_label(str(switch))} ({', '.join(measures)})")
+    return f"{text} {say('study_sentences.interaction', switches=', '.join(parts))}"
 
 
 def correlation_sentence(correlation: pd.DataFrame) -> str:
     """The paper's strongest correlation beside ours."""
     own = correlation[(correlation["method"] == "pearson") & (correlation["x"] == "alpha0")]
     by_level = {row["level"]: row for row in own[own["y"] == "mean_return"].to_dict("records")}
-    theirs, ours = (interval(by_level[level], "r", "ci_low", "ci_high", 2) for level in ("published", "cells"))
-    return (
-        f"With the published labels, the start weight and the mean return of these cells correlate at {ours}; "
-        f"published {theirs}. No run behind it has a start weight other than 1."
-    )
+    published, ours = (interval(by_level[level], "r", "ci_low", "ci_high", 2) for level in ("published", "cells"))
+    return say("study_sentences.correlation", ours=ours, published=published)
 
 
 def agreement_sentence(agreement: pd.DataFrame) -> str:
     """Whether the two implementations differ beyond chance."""
     tested = agreement.dropna(subset="p_holm")
-    seeds = f"{agreement['our_seeds'].max():.0f} seeds beside {agreement['their_seeds'].max():.0f}"
+    counts = {"ours": f"{agreement['our_seeds'].max():.0f}", "theirs": f"{agreement['their_seeds'].max():.0f}"}
+    seeds = say("study_sentences.agreement_seeds", **counts)
     if tested.empty:
-        return f"Whether ours differs from Stable-Baselines3's cannot be told ({seeds})."
+        return say("study_sentences.agreement_unknown", seeds=seeds)
     apart = tested[tested["p_holm"] < LEVEL]
     if apart.empty:
         first = tested.iloc[0].to_dict()
         difference = interval(first, "difference", "ci_low", "ci_high", *decimals(first["metric"]))
-        return (
-            f"None of {len(tested)} measures differs from Stable-Baselines3's beyond chance ({seeds}); "
-            f"the difference to its {first['algorithm'].upper()} in {within(NAMES[first['metric']])} is {difference}."
+        measure, algorithm = within(first["metric"]), first["algorithm"].upper()
+        return say(
+            "study_sentences.agreement_none",
+            measures=len(tested),
+            seeds=seeds,
+            algorithm=algorithm,
+            measure=measure,
+            difference=difference,
         )
-    names = ", ".join(within(NAMES[name]) for name in apart["metric"])
-    return f"{len(apart)} of {len(tested)} measures differ from Stable-Baselines3's beyond chance ({seeds}): {names}."
+    names = ", ".join(within(name) for name in apart["metric"])
+    return say("study_sentences.agreement_some", apart=len(apart), measures=len(tested), seeds=seeds, names=names)
 
 
 def shaping_sentence(shaped: pd.DataFrame) -> str:
@@ -220,8 +189,8 @@ def shaping_sentence(shaped: pd.DataFrame) -> str:
     if (
         2.0 ** (1 - seeds) * (len(measured) if only else family) > LEVEL
     ):  # the smallest p of a sign-flip test, corrected
-        cells = "the shaped cell" if only else f"{family} shaped cells"
-        return f"With {seeds} seeds no difference between {cells} and none can be told from chance."
+        cells = say("study_sentences.shaping_only") if only else say("study_sentences.shaping_cells", count=family)
+        return say("study_sentences.shaping_few", seeds=seeds, cells=cells)
     if only:
         return _only_cell_sentence(measured)
     parts = []
@@ -229,11 +198,10 @@ def shaping_sentence(shaped: pd.DataFrame) -> str:
         own = measured[measured["metric"] == metric].dropna(subset="p_holm")
         apart = own[own["p_holm"] < LEVEL]
         better = (apart["difference"] < 0).sum() if metric.endswith("distance") else (apart["difference"] > 0).sum()
-        parts.append(
-            f"{within(NAMES[metric])} in {len(apart)} of {len(own)}"
-            + (f" ({better} for the better)" if len(apart) else "")
-        )
-    return f"Shaped cells that differ from none beyond chance (Holm, 5 %): {', '.join(parts)}."
+        text = "study_sentences.shaping_better" if len(apart) else "study_sentences.shaping_measure"
+        measure = within(metric)
+        parts.append(say(text, measure=measure, apart=len(apart), cells=len(own), better=better))
+    return say("study_sentences.shaping", measures=", ".join(parts))
 
 
 def _only_cell_sentence(measured: pd.DataFrame) -> str:
@@ -243,7 +211,8 @@ def _only_cell_sentence(measured: pd.DataFrame) -> str:
     chance: list[str] = []
     for row in rows.reset_index().to_dict("records"):
         difference = interval(row, "difference", "ci_low", "ci_high", *decimals(row["metric"]))
-        text = f"{within(NAMES[row['metric']])} {difference}, p {p_value(row['p_holm'])}"
+        measure, p = within(row["metric"]), p_value(row["p_holm"])
+        text = say("study_sentences.only_measure", measure=measure, difference=difference, p=p)
         (changed if row["p_holm"] < LEVEL else chance).append(text)
-    told = f"What shaping adds beyond chance (Holm over the measures, 5 %): {'; '.join(changed) or 'nothing'}."
-    return f"{told} Not to be told from chance: {'; '.join(chance)}." if chance else told
+    told = say("study_sentences.only", measures="; ".join(changed) or say("study_sentences.only_nothing"))
+    return f"{told} {say('study_sentences.only_chance', measures='; '.join(chance))}" if chance else told

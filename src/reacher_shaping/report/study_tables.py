@@ -8,27 +8,12 @@ import pandas as pd
 from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.labels import budget_label, cell_order, number, of_protocol, setting_label, variant_label
 from reacher_shaping.report import paper_tables
+from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid, of_table
 
 METRICS = ("success_rate", "unit_return", "final_distance")
 SHAPING = ("success_rate", "final_success_rate", "mean_return", "final_distance", "area_under_curve")
-NAMES = {
-    "success_rate": "Success, any step",
-    "final_success_rate": "Success, last step",
-    "mean_return": "Mean return",
-    "final_distance": "Distance at the last step (mm)",
-    "deterministic_success_rate": "Success, any step, mean action",
-    "deterministic_final_success_rate": "Success, last step, mean action",
-    "deterministic_mean_return": "Mean return, mean action",
-    "deterministic_final_distance": "Distance at the last step, mean action (mm)",
-    "unit_return": "Mean return at control weight 1",
-    "area_under_curve": "Mean return while training",
-}
-PAIRS = {
-    ("alpha0", "mean_return"): "r(α₀, return)",
-    ("success_rate", "mean_return"): "r(success, return)",
-    ("success_rate", "budget"): "r(success, budget)",
-}
+PAIRS = (("alpha0", "mean_return"), ("success_rate", "mean_return"), ("success_rate", "budget"))
 LOGGED = {"peak_iteration": 0, "peak_return": 1, "final_return": 1}
 DASH = "\N{EN DASH}"
 
@@ -58,7 +43,7 @@ def p_value(value: float) -> str:
 def effects(table: pd.DataFrame) -> Grid:
     """A row per switch, variant and kind of effect; for each measure the difference and its corrected p."""
     rows = []
-    kinds = {**KINDS, "interaction": "last less alone"}
+    kinds = {**KINDS, "interaction": say("study_sentences.difference_of_kinds")}
     for (switch, variant, kind), own in table.groupby(["switch", "variant", "effect"], sort=False):
         by_metric = {str(row["metric"]): row for row in own.to_dict("records")}
         first = next(iter(by_metric.values()))
@@ -67,8 +52,8 @@ def effects(table: pd.DataFrame) -> Grid:
             row, (digits, factor) = by_metric[metric], decimals(metric)
             entries += [interval(row, "difference", "ci_low", "ci_high", digits, factor), p_value(row["p_holm"])]
         rows.append((list(dict.fromkeys(table["switch"])).index(switch), entries))
-    headings = ["Switch", "Variant", "Effect"]
-    headings += [text for metric in METRICS for text in (NAMES[metric], "p")]
+    headings = list(entry("tables.effects"))
+    headings += [text for metric in METRICS for text in (entry("measures")[metric], "p")]
     return Grid(headings, [entries for _, entries in sorted(rows, key=lambda row: row[0])], frozenset({0, 1, 2}))
 
 
@@ -78,7 +63,7 @@ def correlation(table: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:
     The last column is the main study's, whose start weights are what they say.
     """
     rows = []
-    for (x, y), name in PAIRS.items():
+    for x, y in PAIRS:
         own = table[(table["method"] == "pearson") & (table["x"] == x) & (table["y"] == y)]
         by_level = {row["level"]: row for row in own.to_dict("records")}
         seeds = own[own["level"].str.startswith("seed")]["r"].dropna()
@@ -87,9 +72,8 @@ def correlation(table: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:
             interval(by_level[level], "r", "ci_low", "ci_high", 2) if level in by_level else DASH
             for level in ("published", "cells", "cells_all")
         ]
-        rows.append([name, *texts, span, _main_correlation(main, x, y)])
-    headings = ["", "Published", "Over the same cells", "over all of them", "One seed a cell, range"]
-    return Grid([*headings, "The text's protocol, true α₀"], rows)
+        rows.append([entry("pairs")[f"{x}-{y}"], *texts, span, _main_correlation(main, x, y)])
+    return Grid(list(entry("tables.correlation")), rows)
 
 
 def _main_correlation(main: pd.DataFrame | None, x: str, y: str) -> str:
@@ -111,9 +95,7 @@ def beside(cells: pd.DataFrame, published: pd.DataFrame) -> Grid:
             texts.append(number(factor * row[f"{metric}_published"], digits))
             texts.append(interval(row, metric, f"{metric}_low", f"{metric}_high", digits, factor))
         rows.append(texts)
-    headings = ["Published run", "Variant", "Budget, label"]
-    headings += [text for metric in ("success_rate", "mean_return") for text in (f"{NAMES[metric]}, published", "ours")]
-    return Grid(headings, rows, frozenset({0, 1, 2}))
+    return Grid(list(entry("tables.beside")), rows, frozenset({0, 1, 2}))
 
 
 def logs(table: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
@@ -139,10 +121,17 @@ def logs(table: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
             continue
         texts = [number(run[name], digits) for name, digits in LOGGED.items()]
         setting = budget_label(int(run["budget"]))
-        std = f"{number(run['std_1'], 2)} and {number(run['std_2'], 2)}"
-        rows.append([f"published, {run['run']}", variant_label(str(run["variant"])), setting, *texts, std])
-    headings = ["Protocol", "Variant", "Budget, label", "Iteration of the peak", "Peak", "End", "Deviation at the end"]
-    return Grid(headings, rows, frozenset({0, 1, 2}))
+        std = say("study_sentences.two", first=number(run["std_1"], 2), second=number(run["std_2"], 2))
+        rows.append(
+            [
+                say("study_sentences.published_log", run=run["run"]),
+                variant_label(str(run["variant"])),
+                setting,
+                *texts,
+                std,
+            ]
+        )
+    return Grid(list(entry("tables.logs")), rows, frozenset({0, 1, 2}))
 
 
 def agreement(table: pd.DataFrame) -> Grid:
@@ -152,8 +141,8 @@ def agreement(table: pd.DataFrame) -> Grid:
         digits, factor = decimals(row["metric"])
         means = [number(factor * row[name], digits) for name in ("ours", "theirs")]
         difference = interval(row, "difference", "ci_low", "ci_high", digits, factor)
-        rows.append([NAMES[row["metric"]], *means, difference, p_value(row["p"]), p_value(row["p_holm"])])
-    return Grid(["Measure", "Ours", "Stable-Baselines3", "Difference", "p (Welch)", "p (Holm)"], rows)
+        rows.append([entry("measures")[row["metric"]], *means, difference, p_value(row["p"]), p_value(row["p_holm"])])
+    return Grid(list(entry("tables.agreement")), rows)
 
 
 def shaping(shaped: pd.DataFrame) -> Grid:
@@ -171,7 +160,7 @@ def shaping(shaped: pd.DataFrame) -> Grid:
             entries.append(interval(own[metric], "difference", "ci_low", "ci_high", digits, factor))
             entries.append(p_value(own[metric]["p_holm"]))
         rows.append(entries)
-    headings = ["Protocol", "Variant", "Budget, α₀", *(text for name in SHAPING for text in (NAMES[name], "p"))]
+    headings = [*entry("tables.shaping"), *(text for name in SHAPING for text in (entry("measures")[name], "p"))]
     return Grid(headings, rows, frozenset({0, 1, 2}))
 
 
@@ -184,4 +173,4 @@ def cells(table: pd.DataFrame) -> Grid:
     keep = ["policy", "variant", "budget", "alpha0", "seeds", "diverged"]
     keep += [f"{name}{end}" for name in paper_tables.MEASURED for end in ("", "_low", "_high")]
     grid = of_table(frame[keep])
-    return Grid(["Protocol", *grid.headings[1:]], grid.rows, grid.texts)
+    return Grid([say("tables.protocol"), *grid.headings[1:]], grid.rows, grid.texts)

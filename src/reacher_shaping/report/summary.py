@@ -7,15 +7,9 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping.labels import budget_label, in_groups, number, of_protocol, setting_label, variant_label
+from reacher_shaping.report.text import entry, say
 
 Row = dict[Any, Any]
-# The paper's guiding questions (Sec. 4.1) and the claims whose verdicts answer them.
-QUESTIONS = {
-    "Does potential-based shaping speed PPO's learning up?": ("C17",),
-    "Which potential learns better, the distance (L2) or its square (L2²)?": ("C12",),
-    "Does a decaying weight help further?": ("C2", "C3"),
-    "Can shaping lift PPO over the unshaped baseline?": ("C1", "C13"),
-}
 VERDICTS = ("reproduced", "not reproduced", "inconclusive", "untestable")
 
 
@@ -39,12 +33,12 @@ class Summary:
 def summary(cells: pd.DataFrame, claims: pd.DataFrame | None, protocol: str | None = None) -> Summary:
     """The headline and the four answers; without claims only what the table of cells shows."""
     ours = of_protocol(cells, protocol)
-    headline = [_best_and_baseline(ours)] if not ours.empty else ["No cell has been evaluated."]
+    headline = [_best_and_baseline(ours)] if not ours.empty else [say("summary.nothing")]
     if claims is None or claims.empty:
-        return Summary([*headline, "The paper's claims have not been tested on these runs."], [])
+        return Summary([*headline, say("summary.untested")], [])
     return Summary(
         [*headline, _verdict_counts(claims)],
-        [_answer(question, claims[claims["id"].isin(ids)]) for question, ids in QUESTIONS.items()],
+        [_answer(question["ask"], claims[claims["id"].isin(question["claims"])]) for question in entry("questions")],
     )
 
 
@@ -55,18 +49,21 @@ def _best_and_baseline(cells: pd.DataFrame) -> str:
     plain = sorted((row for row in rows if row["variant"] == "none"), key=lambda row: row["budget"])
     shaped = [row for row in rows if row["variant"] != "none"]
     if not shaped:
-        return f"Only cells without shaping were run; the best success rate is {_percent(rows[0], 'success_rate')}."
+        return say("summary.only_plain", rate=_percent(rows[0], "success_rate"))
     best = shaped[0]
-    text = f"The highest success rate of a shaped cell is that of {_name(best)}: {_percent(best, 'success_rate')}"
+    text = say("summary.best", cell=_name(best), rate=_percent(best, "success_rate"))
     if not plain:
-        return f"{text}. The study has no cell without shaping."
-    rates = [f"{_percent(row, 'success_rate')} after {budget_label(row['budget'])} steps" for row in plain]
-    text += f"; without shaping it is {' and '.join(rates)}."
+        return say("summary.no_plain", best=text)
+    rates = [
+        say("summary.plain_rate", rate=_percent(row, "success_rate"), budget=budget_label(row["budget"]))
+        for row in plain
+    ]
+    text = say("summary.plain", best=text, rates=" and ".join(rates))
     same = [row for row in plain if row["budget"] == best["budget"]]
     if not same:
         return text
     apart = same[0]["success_rate_high"] < best["success_rate_low"]
-    return f"{text} The intervals of the two at {budget_label(best['budget'])} {'are apart' if apart else 'overlap'}."
+    return f"{text} {say('summary.apart' if apart else 'summary.overlap', budget=budget_label(best['budget']))}"
 
 
 def _name(row: Row) -> str:
@@ -83,33 +80,29 @@ def _percent(row: Row, name: str) -> str:
 def _verdict_counts(claims: pd.DataFrame) -> str:
     counts = claims["verdict"].value_counts()
     parts = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS if verdict in counts]
-    return f"Of the paper's {len(claims)} claims, " + ", ".join(parts) + "."
+    return say("summary.counts", claims=len(claims), counts=", ".join(parts))
 
 
 def _answer(question: str, claims: pd.DataFrame) -> Answer:
     """Yes where all claims behind a question are reproduced, no where none is and none is open."""
     verdicts = set(claims["verdict"])
     if not verdicts:
-        short = "Not tested."
+        short = "untested"
     elif verdicts == {"reproduced"}:
-        short = "As the paper says."
+        short = "as_said"
     elif verdicts == {"not reproduced"}:
-        short = "Not as the paper says."
-    elif "reproduced" in verdicts and "not reproduced" in verdicts:
-        short = "In part as the paper says."
+        short = "not_as_said"
     elif "reproduced" in verdicts:
-        short = "In part as the paper says, in part open."
-    elif "not reproduced" in verdicts:
-        short = "Not shown, in part open."
+        short = "partly" if "not reproduced" in verdicts else "partly_open"
     else:
-        short = "These runs cannot tell."
-    return Answer(question, short, [claim_sentence(row) for row in claims.to_dict("records")])
+        short = "not_shown" if "not reproduced" in verdicts else "open"
+    return Answer(question, say(f"answers.{short}"), [claim_sentence(row) for row in claims.to_dict("records")])
 
 
 def claim_sentence(row: Row) -> str:
     """One claim with its verdict and, where there is one, the measured effect."""
-    text = f"{row['id']}, “{str(row['claim']).rstrip('.')}”: {row['verdict']}"
-    return text + (f" ({effect(row)})." if pd.notna(row["measured"]) else ".")
+    text: str = "summary.claim_measured" if pd.notna(row["measured"]) else "summary.claim"
+    return say(text, id=row["id"], claim=str(row["claim"]).rstrip("."), verdict=row["verdict"], effect=effect(row))
 
 
 def effect(row: Row) -> str:
@@ -118,7 +111,7 @@ def effect(row: Row) -> str:
     if np.isnan(values[0]):
         return "\N{EN DASH}"
     texts = [short_number(value) for value in values]
-    return texts[0] if np.isnan(values[1]) else f"{texts[0]}, 95 % interval {texts[1]} to {texts[2]}"
+    return texts[0] if np.isnan(values[1]) else say("summary.interval", value=texts[0], low=texts[1], high=texts[2])
 
 
 def short_number(value: float) -> str:
@@ -138,7 +131,8 @@ def to_markdown(content: Summary) -> str:
 
 def claims_markdown(claims: pd.DataFrame) -> str:
     """Every claim with published evidence, measured effect, test and verdict."""
-    lines = ["| Claim | | Published | Measured | Test | Verdict |", "|:--|:--|:--|:--|:--|:--|"]
+    headings = entry("summary.claims_headings")
+    lines = [f"| {' | '.join(headings)} |", f"|{':--|' * len(headings)}"]
     for row in claims.to_dict("records"):
         entries = (row["id"], row["claim"], row["published"], effect(row), row["test"], f"**{row['verdict']}**")
         lines.append("| " + " | ".join(str(entry).replace("|", "\\|") for entry in entries) + " |")

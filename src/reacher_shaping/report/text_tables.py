@@ -9,6 +9,7 @@ import pandas as pd
 
 from reacher_shaping.labels import setting_label, stochastic, variant_label, variant_order
 from reacher_shaping.report import paper_tables
+from reacher_shaping.report.text import say
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ def of_table(table: pd.DataFrame) -> Grid:
 def to_markdown(grid: Grid) -> str:
     """The grid for a notebook."""
     marks = [":--" if place in grid.texts else "--:" for place in range(len(grid.headings))]
-    rows = grid.rows or [["no such cells in this study", *[""] * (len(grid.headings) - 1)]]
+    rows = grid.rows or [[say("tables.none"), *[""] * (len(grid.headings) - 1)]]
     lines = [" | ".join(row) for row in (grid.headings, marks, *rows)]
     return "\n".join(f"| {line} |" for line in lines)
 
@@ -43,7 +44,7 @@ def settings_grid(study: Mapping[str, Any], protocols: Collection[str] | None = 
     flat = {name: _flatten({k: v for k, v in settings.items() if k != "name"}) for name, settings in shown.items()}
     keys = list(dict.fromkeys(key for settings in flat.values() for key in settings))
     rows = [[key, *(plain(settings.get(key, "")) for settings in flat.values())] for key in keys]
-    return Grid(["Setting", *(name.replace("_", " ") for name in flat)], rows)
+    return Grid([say("tables.setting"), *(name.replace("_", " ") for name in flat)], rows)
 
 
 def departures_grid(study: Mapping[str, Any]) -> Grid:
@@ -74,7 +75,7 @@ def plain(value: Any) -> str:
 def study_grid(cells: pd.DataFrame) -> Grid:
     """Seeds evaluated per variant (rows), budget and alpha0 (columns), with the count of those that diverged."""
     if cells.empty:
-        return Grid(["Variant"], [])
+        return Grid([say("headings.variant")], [])
     counts = cells.pivot_table(index="variant", columns=["alpha0", "budget"], values=["seeds", "diverged"], sort=False)
     seeds, diverged = counts["seeds"], counts["diverged"]
     seeds = seeds.sort_index(axis="columns", level=[0, 1], ascending=[False, True])
@@ -84,7 +85,7 @@ def study_grid(cells: pd.DataFrame) -> Grid:
         pairs = zip(seeds.loc[name], diverged.loc[name, seeds.columns], strict=True)
         texts = ["" if np.isnan(count) else paper_tables.seed_count(count, lost) for count, lost in pairs]
         rows.append([variant_label(str(name)), *texts])
-    return Grid(["Variant", *(setting_label(budget, alpha0) for alpha0, budget in settings)], rows)
+    return Grid([say("headings.variant"), *(setting_label(budget, alpha0) for alpha0, budget in settings)], rows)
 
 
 def controllers_grid(controllers: pd.DataFrame | None, protocol: str | None = None) -> Grid | None:
@@ -97,4 +98,4 @@ def controllers_grid(controllers: pd.DataFrame | None, protocol: str | None = No
     names = [str(name).replace("_", " ") for name in controllers["controller"]]
     headings = [heading.removesuffix(" [95 % interval]") for heading in frame.columns]
     rows = [[name, *row] for name, row in zip(names, frame.to_numpy().tolist(), strict=True)]
-    return Grid(["Policy", *headings], rows)
+    return Grid([say("headings.policy"), *headings], rows)
