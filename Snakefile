@@ -2,7 +2,7 @@ from pathlib import Path
 
 from snakemake.utils import min_version
 
-from reacher_shaping.settings.study import load_study, require_mapping, settings_hash
+from reacher_shaping.settings.study import settings_hash
 
 min_version("9.0")
 
@@ -12,13 +12,7 @@ HERE = Path(workflow.basedir)
 include: "workflow/rules/common.smk"
 
 
-or_stop(require_mapping, HERE / "config.yaml")
-
-
-configfile: str(HERE / "config.yaml")
-
-
-STUDY = or_stop(load_study, config)
+STUDY = or_stop(read_study)
 SETTINGS_HASH = settings_hash(STUDY)
 
 
@@ -54,3 +48,18 @@ rule all:
         MADE_FIGURES,
         "report/report.html",
         CRATE,
+
+
+# The last rules, so that the names of all others are known.
+for name in EXPERIMENTS:
+    if workflow.is_rule(name):
+        sys.exit(f"ConfigError: config: experiments: {name!r} is the name of a rule; allowed: any other name")
+
+    rule:
+        name:
+            name
+        input:
+            runs_of(name),
+            tables_of(name),
+            f"results/experiments/{name}/check.txt",
+            figures_of(name),

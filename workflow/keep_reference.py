@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from snakemake.utils import update_config
 
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.readme import headline, put_headline, sections
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.outputs import table_files
-from reacher_shaping.settings.study import block_name, load_study, require_mapping, settings_hash
+from reacher_shaping.settings.study import block_name, load_study, read_settings, settings_hash
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import ArtifactError, read_json, read_table, write_json, write_text
 from reacher_shaping.storage.reference import keep_experiments, keep_tables, manifest
@@ -33,8 +32,7 @@ def manifests(cells: Iterable[Cell], blocks: Iterable[range]) -> list[dict[str, 
 
 
 def main() -> None:
-    settings = dict(require_mapping("config.yaml"))
-    update_config(settings, require_mapping(sys.argv[1]) if len(sys.argv) > 1 else {})
+    settings = read_settings("config.yaml", *sys.argv[1:2])
     study = load_study(settings)
     blocks = manifests(study.cells, study.blocks())
     keep_tables(RESULTS, KEPT)

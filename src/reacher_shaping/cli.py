@@ -12,7 +12,7 @@ from reacher_shaping import __version__
 PROGRAM = "reacher-shaping"
 COLUMNS = ("run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance")
 RECORDINGS = (".gif", ".mp4")
-MOST_EPISODES = 10**6
+MOST_EPISODES, MOST_SEED = 10**6, 2**63 - 1
 _DESCRIPTION = "Play, record and evaluate trained policies on Reacher-v5."
 _EPILOG = (
     "A policy is a policy.pt of this project (several runs, one a seed) or one state dict in the layout of the "
@@ -220,6 +220,6 @@ def _recording(text: str) -> Path:
 _radius = _number(0, "a number of m above 0", strict=True)
 _weight = _number(0, "a number from 0 on", strict=False)
 _count = _whole(1, MOST_EPISODES, f"a whole number from 1 to {MOST_EPISODES}")
-_seed = _whole(0, 2**63 - 1, "a whole number from 0 on")
+_seed = _whole(0, MOST_SEED, f"a whole number from 0 to {MOST_SEED} (2^63 - 1)")
 if __name__ == "__main__":
     sys.exit(main())

@@ -3,7 +3,7 @@
 import pytest
 
 from reacher_shaping.settings.outputs import views
-from reacher_shaping.settings.study import load_study, require_mapping
+from reacher_shaping.settings.study import load_study, read_settings
 
 
 def keys(*cells):
@@ -26,7 +26,7 @@ def test_views_follow_from_the_cells(cells, switches, expected):
 
 
 def test_the_studies_of_the_configuration_have_theirs():
-    study = load_study(require_mapping("config.yaml"))
+    study = load_study(read_settings("config.yaml"))
     found = {
         name: views([cell.key for cell in cells], switches=study.experiments[name].switches is not None)
         for name, cells in study.experiment_cells.items()

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from reacher_shaping.settings.base import ConfigError, plain
 from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Shaping, Variant
-from reacher_shaping.settings.study import block_name, load_study, require_mapping
+from reacher_shaping.settings.study import block_name, load_study, read_settings
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = yaml.safe_load((ROOT / "config.yaml").read_text())
@@ -152,6 +152,9 @@ def test_a_label_may_be_given_to_the_baseline():
         ("seeds", None, ["seeds = None", "integer"]),
         ("seeds_per_block", 0, ["seeds_per_block = 0"]),
         ("root_seed", -1, ["root_seed = -1"]),
+        ("root_seed", 2**63, ["root_seed = 9223372036854775808", "less than 9223372036854775808"]),
+        ("root_seed", "2025-99-99", ["root_seed = '2025-99-99'", "integer"]),
+        ("evaluation.radius", "1:30.5", ["evaluation.radius = '1:30.5'", "number"]),
         ("experiments.attribution.switches.start", "text", ["attribution.switches.start = 'text'", "paper"]),
         ("experiments.attribution.switches.variants", ["l3"], ["attribution.switches.variants = 'l3'", "none"]),
         (
@@ -175,7 +178,7 @@ def test_a_label_may_be_given_to_the_baseline():
         ("grid.0.ppo", {"epochs": 5}, ["paper-none-500000-alpha1", "another study", "other settings"]),
         ("protocols.paper.ppo.networks", "two", ["networks = 'two'", "'shared' or 'separate'"]),
         ("protocols.paper.log.episode_return", "both", ["log.episode_return = 'both'", "'unshaped' or 'released'"]),
-        ("protocols.paper.ppo.learning_rate", "3e-4", ["learning_rate = '3e-4'", "YAML reads this as text", "3.0e-4"]),
+        ("protocols.paper.ppo.learning_rate", "3e-4", ["learning_rate = '3e-4'", "valid number"]),
         ("experiments.standard.peers.budgets", {"ppo": 4096}, ["peers.budgets.ppo = 4096", "500000, 1000000"]),
         ("protocols.standard.ppo.networks", "shared", ["Stable-Baselines3's PPO has networks = 'separate'"]),
         ("protocols.standard.ppo.minibatch_size", 1, ["minibatch_size = 1", ">= 2"]),
@@ -199,7 +202,8 @@ def test_a_label_may_be_given_to_the_baseline():
         ("grid.0.budgets", 500_000, ["grid.0.budgets = 500000", "list"]),
         ("grid.0.variants", ["l3"], ["grid.0.variants = 'l3'", "allowed: none, l2"]),
         ("grid.0.alpha0", [0.5], ["alpha0 = 0.5", "'none'", "allowed: 1"]),
-        ("grid.1.alpha0", [0.0], ["grid.1.alpha0.0 = 0.0", "greater than 0"]),
+        ("grid.1.alpha0", [0.0], ["grid.1.alpha0.0 = 0.0", "or equal to 0.000001"]),
+        ("grid.1.alpha0", [1.0e-300], ["grid.1.alpha0.0 = 1e-300", "0.000001"]),
         ("grid.1.alpha0", [1.0], ["paper-l2-500000-alpha1", "2 times"]),
         ("grid.0.protocol", "mine", ["grid.0.protocol = 'mine'", "allowed: paper"]),
         ("grid.0.ppo", {"lr": 1}, ["grid.0.ppo.lr = 1", "learning_rate"]),
@@ -210,7 +214,7 @@ def test_a_label_may_be_given_to_the_baseline():
         ("protocols.paper.ppo.minibatch_size", 100, ["minibatch_size = 100", "divide", "2048"]),
         ("protocols.paper.ppo.learning_rate", -0.1, ["protocols.paper.ppo.learning_rate = -0.1", "greater than 0"]),
         ("protocols.paper.ppo.discount", 1.5, ["protocols.paper.ppo.discount = 1.5", "less than or equal to 1"]),
-        ("protocols.paper.ppo.epochs", 10.0, ["protocols.paper.ppo.epochs = 10.0", "integer"]),
+        ("protocols.paper.ppo.epochs", 10.5, ["protocols.paper.ppo.epochs = 10.5", "integer"]),
         ("protocols.paper.environment.clip_actions", 1, ["clip_actions = 1", "boolean"]),
         ("protocols.paper.shaping.form", "new", ["form = 'new'", "'paper' or 'dynamic'"]),
         ("protocols.tables", {}, ["'tables'", "allowed: any other name"]),
@@ -242,11 +246,18 @@ def test_missing_key_is_named():
 def test_file_that_is_no_mapping_is_refused_by_name(tmp_path, text):
     path = tmp_path / "config.yaml"
     path.write_text(text)
-    for read in (load_study, require_mapping):
+    for read in (load_study, read_settings):
         with pytest.raises(ConfigError) as caught:
             read(path)
         assert "config.yaml" in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [500_000, 5e5])
+def test_a_whole_number_may_have_an_exponent(value):
+    cells = load_study(changed("grid.2.budgets", [value])).cells
+    assert [type(cell.budget) for cell in cells] == [int] * len(cells)
+    assert cells[-1].folder == "paper/decay500k_l2sq/500000/alpha0.5"
 
 
 def test_missing_file_is_refused_by_name(tmp_path):

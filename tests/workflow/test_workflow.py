@@ -57,6 +57,48 @@ def test_impossible_value_ends_a_dry_run_with_one_line(empty):
         assert refusal(empty) == "ConfigError: config: seeds = 0: should be greater than or equal to 1"
 
 
+OVERLAYS = {
+    "seeds: 2\nseeds: 3": "overlay.yaml, line 2: cannot be read as YAML: the key 'seeds' is there twice",
+    "root_seed: 2025-99-99": "overlay.yaml, line 1: cannot be read as YAML: Snakemake takes '2025-99-99' for",
+    'root_seed: !!int "abc"': "overlay.yaml, line 1: cannot be read as YAML: 'abc' is no int",
+    f"root_seed: {'[' * 3000}{']' * 3000}": "overlay.yaml: is nested too deep",
+    "evaluation: {radius: 1:30.5}": "config: evaluation.radius = '1:30.5': should be a valid number",
+    "experiments: {correlate: {seeds: 1, grid: [{variants: [none], budgets: [5e5]}]}}": "config: experiments: "
+    "'correlate' is the name of a rule",
+}
+
+
+@pytest.mark.parametrize(("text", "words"), OVERLAYS.items(), ids=[text[:20] for text in OVERLAYS])
+def test_impossible_overlay_ends_a_dry_run_with_one_line(empty, text, words):
+    (empty.folder / "overlay.yaml").write_text(text)
+    done = empty.snakemake("--dry-run", "--configfile", "overlay.yaml")
+    assert done.returncode != 0
+    [line] = [line for line in (done.stdout + done.stderr).splitlines() if "profile" not in line]
+    assert line.startswith("ConfigError: ")
+    assert words in line
+
+
+def test_overlay_is_read_as_yaml_1_2(empty):
+    (empty.folder / "overlay.yaml").write_text("seeds: 010\nseeds_per_block: 5e0")
+    blocks = empty.planned("--configfile", "overlay.yaml")["train_block"]
+    assert {path.split("/")[5] for path in blocks} == {"seeds0-4", "seeds5-9"}
+
+
+def test_nested_value_on_the_command_line_is_told_of_configfile(empty):
+    done = empty.snakemake("--dry-run", "--config", "evaluation={radius: 0.03}")
+    assert done.returncode != 0
+    assert "ConfigError: --config evaluation = {'radius': '0.03'}: allowed: a single value" in done.stderr
+    assert "--configfile" in done.stderr
+
+
+@pytest.mark.parametrize("file", [f"{NONE}/seeds7-9/policy.pt", "results/media/mine.gif", "results/peers/a/seed0.json"])
+def test_file_of_no_cell_is_one_that_no_rule_makes(empty, file):
+    done = empty.snakemake("--dry-run", "--", file)
+    assert done.returncode != 0
+    assert f"No rule to produce {file}" in done.stdout
+    assert "Traceback" not in done.stdout + done.stderr
+
+
 def test_unknown_variant_ends_a_dry_run_with_one_line(empty):
     with empty.configured(grid=[{"variants": ["l3"], "budgets": [2048]}]):
         said = refusal(empty)

@@ -1,20 +1,37 @@
 # Functions that several stages share.
 import json
 import os
+import re
 import sys
 
-from reacher_shaping.settings.base import ConfigError
+from reacher_shaping.settings.base import ConfigError, short
+from reacher_shaping.settings.study import load_study, read_settings
+from reacher_shaping.settings.yaml_file import merged
 from reacher_shaping.storage.code_hash import code_hash
 
 os.environ.update(OMP_NUM_THREADS="1")  # one thread a job; Snakemake fills the cores with jobs
 
 
-def or_stop(read, settings):
+def or_stop(read):
     """What `read` makes of the settings; where they are wrong, end with its one line and no traceback."""
     try:
-        return read(settings)
+        return read()
     except ConfigError as error:
         sys.exit(f"ConfigError: {error}")
+
+
+def read_study():
+    """config.yaml with what `--configfile`, `--config` and a workflow that imports this one lay over it.
+
+    There is no `configfile:`, since Snakemake reads YAML 1.1, in which 010 is 8; so the files are read here again.
+    """
+    single = workflow.config_settings.config
+    for key, value in single.items():
+        if isinstance(value, (dict, list)):
+            wanted = "allowed: a single value; write this one into a file and name it with --configfile"
+            raise ConfigError(f"--config {key} = {short(value)}: {wanted}")
+    overlays = read_settings(*workflow.overwrite_configfiles)
+    return load_study(merged(read_settings(HERE / "config.yaml"), config, overlays, single))
 
 
 def source(path):
@@ -28,6 +45,11 @@ WORDS = source("src/reacher_shaping/report/text.yaml")
 def code(script):
     """Hash of the code a script runs: a param, so that an edit of that code and nothing else reruns its jobs."""
     return code_hash(HERE / "workflow/scripts" / f"{script}.py")
+
+
+def one_of(names):
+    """A wildcard's constraint: these names alone, so that any other is a file that no rule makes."""
+    return "|".join(map(re.escape, names)) or "(?!)"
 
 
 def as_json(settings):

@@ -6,8 +6,8 @@ MADE_FIGURES = [path for name in MADE for path in figures_of(name)]
 
 
 wildcard_constraints:
-    experiment="|".join(EXPERIMENTS) or "none",
-    view="|".join(VIEWS),
+    experiment=one_of(EXPERIMENTS),
+    view=one_of(VIEWS),
 
 
 use rule aggregate_runs as aggregate_experiment with:
@@ -50,6 +50,8 @@ use rule train_peer as train_experiment_peer with:
         "results/logs/experiments/{experiment}/{algorithm}-{seed}.log",
     benchmark:
         "results/benchmarks/experiments/{experiment}/{algorithm}-{seed}.tsv"
+    wildcard_constraints:
+        experiment=one_of(name for name in EXPERIMENTS if peers_of(name)),
     params:
         budget=lambda wildcards: STUDY.experiments[wildcards.experiment].peers.budgets[wildcards.algorithm],
         protocol=of_experiment(lambda cells, seeds: as_json(cells[0].protocol.model_dump())),
@@ -107,6 +109,8 @@ rule measure_effects:
         "results/logs/experiments/{experiment}/effects.log",
     benchmark:
         "results/benchmarks/experiments/{experiment}/effects.tsv"
+    wildcard_constraints:
+        experiment=one_of(name for name, study in STUDY.experiments.items() if study.switches),
     threads: 1
     params:
         switches=lambda wildcards: as_json(STUDY.experiments[wildcards.experiment].switches.model_dump()),
@@ -127,6 +131,8 @@ rule compare_with_peers:
         "results/logs/experiments/{experiment}/agreement.log",
     benchmark:
         "results/benchmarks/experiments/{experiment}/agreement.tsv"
+    wildcard_constraints:
+        experiment=one_of(name for name in EXPERIMENTS if peers_of(name)),
     threads: 1
     params:
         protocol=of_experiment(lambda cells, seeds: cells[0].protocol.name),
@@ -150,15 +156,3 @@ rule plot_experiment:
         code=code("plot_experiment"),
     script:
         "../scripts/plot_experiment.py"
-
-
-for name in EXPERIMENTS:
-
-    rule:
-        name:
-            name
-        input:
-            runs_of(name),
-            tables_of(name),
-            f"results/experiments/{name}/check.txt",
-            figures_of(name),

@@ -13,6 +13,8 @@ rule render_media:
         "results/logs/media/{name}.log",
     benchmark:
         "results/benchmarks/media/{name}.tsv"
+    wildcard_constraints:
+        name=one_of(CELL_NAMES),
     threads: 1
     params:
         environment=lambda wildcards: as_json(CELL_NAMES[wildcards.name].protocol.environment.model_dump()),

@@ -16,6 +16,8 @@ rule run_notebook:
         "results/logs/notebooks/{notebook}.log",
     benchmark:
         "results/benchmarks/notebooks/{notebook}.tsv"
+    wildcard_constraints:
+        notebook=one_of(NOTEBOOK_SOURCES),
     threads: 1
     params:
         code=code("run_notebook"),

@@ -19,6 +19,9 @@ rule train_peer:
         "results/logs/peers/{algorithm}-{seed}.log",
     benchmark:
         "results/benchmarks/peers/{algorithm}-{seed}.tsv"
+    wildcard_constraints:
+        algorithm=one_of(STUDY.peers.budgets),
+        seed=r"\d+",
     threads: 1
     resources:
         mem_mb=2000,

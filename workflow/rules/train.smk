@@ -8,8 +8,8 @@ BLOCK_FILES = expand(
 
 
 wildcard_constraints:
-    cell=r"[a-z0-9_]+/[a-z0-9_]+/\d+/alpha[\d.]+",
-    block=r"seeds\d+-\d+",
+    cell=one_of(CELLS),
+    block=one_of(SEEDS),
 
 
 rule train_block:

@@ -7,15 +7,23 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]+$", max_length=40)]
-Count = Annotated[int, Field(ge=1, le=10**12)]
-Seed = Annotated[int, Field(ge=0, lt=2**63)]
+
+
+def _whole(value: Any) -> Any:
+    """5e5 and 10.0 are whole numbers; YAML's core schema calls them floating-point ones."""
+    whole = isinstance(value, float) and value.is_integer() and abs(value) < 2**53
+    return int(value) if whole else value
+
+
+Whole = Annotated[int, BeforeValidator(_whole)]
+Count = Annotated[Whole, Field(ge=1, le=10**12)]
+Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
-_EXPONENT = re.compile(r"[+-]?\d+e[+-]?\d+", re.IGNORECASE)
 
 
 class ConfigError(ValueError):
@@ -53,12 +61,14 @@ def first_problem(error: ValidationError) -> str:
         message = str(problem["ctx"]["error"])
         return f"{key}.{message}" if key else message
     value = problem["input"]
-    hint = "; YAML reads this as text: write 0.0003 or 3.0e-4" if _EXPONENT.fullmatch(str(value)) else ""
-    return f"{key} = {short(value)}: {_allowed(problem['msg'])}{hint}"
+    return f"{key} = {short(value)}: {_allowed(problem['msg'], problem.get('ctx', {}))}"
 
 
-def _allowed(message: str) -> str:
-    """Pydantic's message in the words of YAML."""
+def _allowed(message: str, bounds: Mapping[str, Any]) -> str:
+    """Pydantic's message in the words of YAML, and a bound in all its digits, of which pydantic shows sixteen."""
+    for bound in bounds.values():
+        if isinstance(bound, int) and bound > 2**53:
+            message = re.sub(r"\d{16,}", str(bound), message)
     message = re.sub(r"^(Input|Value|String|Dictionary|Tuple) (?=should)", "", message)
     message = message.replace("valid tuple", "list").replace("valid dictionary", "mapping")
     return message.split(" after validation")[0].split(" or instance of")[0]

@@ -11,7 +11,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from reacher_shaping.settings.base import Count, Fraction, Name, NonNegative, Positive, Seed, Settings, plain
+from reacher_shaping.settings.base import Count, Fraction, Name, NonNegative, Positive, Seed, Settings, Whole, plain
+
+Alpha0 = Annotated[float, Field(ge=1e-6, le=1e6)]
+"""The shaping weight at t = 0, without unit; bounded because it names the cell's folder in plain digits."""
 
 EPISODE_STEPS = 50
 """Environment steps of an episode of Reacher-v5; the simulation's own constant, which would load MuJoCo."""
@@ -35,13 +38,13 @@ class PPO(Settings):
     ratio_pairs: Literal["sample", "minibatch"] = "sample"
     advantage_normalisation: Literal["rollout", "minibatch"] = "rollout"
     minibatch_size: Count = 64
-    rollout_steps: Annotated[int, Field(ge=2, le=10**6)] = 2048
-    epochs: Annotated[int, Field(ge=1, le=1000)] = 10
+    rollout_steps: Annotated[Whole, Field(ge=2, le=10**6)] = 2048
+    epochs: Annotated[Whole, Field(ge=1, le=1000)] = 10
     value_coefficient: NonNegative = 0.5
     entropy_coefficient: NonNegative = 0.01
     max_gradient_norm: Positive = 0.5
     adam_epsilon: Positive = 1e-8
-    hidden_units: Annotated[int, Field(ge=1, le=4096)] = 64
+    hidden_units: Annotated[Whole, Field(ge=1, le=4096)] = 64
     networks: Literal["shared", "separate"] = "shared"
     initialisation: Literal["default", "orthogonal"] = "default"
     initial_log_std: float = 0.0
@@ -133,7 +136,7 @@ class Cell(Settings):
     protocol: Protocol
     variant: Variant
     budget: Count
-    alpha0: Positive = 1.0
+    alpha0: Alpha0 = 1.0
     root_seed: Seed = 0
 
     @model_validator(mode="after")

@@ -14,20 +14,30 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-import yaml
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from reacher_shaping.settings.base import ConfigError, Count, Name, Positive, Seed, Settings, first_problem, flat, short
-from reacher_shaping.settings.cell import Cell, Protocol, Variant
+from reacher_shaping.settings.base import (
+    ConfigError,
+    Count,
+    Name,
+    Positive,
+    Seed,
+    Settings,
+    Whole,
+    first_problem,
+    flat,
+    short,
+)
+from reacher_shaping.settings.cell import Alpha0, Cell, Protocol, Variant
+from reacher_shaping.settings.yaml_file import merged, read_mapping
 
-RESERVED_TARGETS = frozenset({"all", "peers", "search"})
 RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
 
 
 class Evaluation(Settings):
     """Evaluation of every trained policy: episodes a run and mode; `radius` of success in m."""
 
-    episodes: Annotated[int, Field(ge=1, le=10**6)] = 1000
+    episodes: Annotated[Whole, Field(ge=1, le=10**6)] = 1000
     radius: Positive = 0.02
 
 
@@ -47,8 +57,10 @@ PEER_PPO: dict[str, Any] = {
 class Peers(Settings):
     """The optional comparison with Stable-Baselines3: environment steps of each algorithm, and runs of each."""
 
-    seeds: Annotated[int, Field(ge=1, le=1000)] = 3
-    budgets: Annotated[dict[Literal["ppo", "sac", "td3"], Annotated[int, Field(ge=100, le=10**9)]], Field(min_length=1)]
+    seeds: Annotated[Whole, Field(ge=1, le=1000)] = 3
+    budgets: Annotated[
+        dict[Literal["ppo", "sac", "td3"], Annotated[Whole, Field(ge=100, le=10**9)]], Field(min_length=1)
+    ]
 
 
 class Row(Settings):
@@ -57,7 +69,7 @@ class Row(Settings):
     protocol: Name = "paper"
     variants: Annotated[tuple[Name, ...], Field(min_length=1)]
     budgets: Annotated[tuple[Count, ...], Field(min_length=1)]
-    alpha0: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0,)
+    alpha0: Annotated[tuple[Alpha0, ...], Field(min_length=1)] = (1.0,)
     environment: dict[str, Any] = Field(default_factory=dict)
     ppo: dict[str, Any] = Field(default_factory=dict)
     shaping: dict[str, Any] = Field(default_factory=dict)
@@ -91,14 +103,14 @@ class Switches(Settings):
     ]
     variants: Names
     budget: Count
-    alpha0: Positive = 1.0
+    alpha0: Alpha0 = 1.0
     alone: bool = True
 
 
 class Experiment(Settings):
     """A further study beside the main one, a target of its name: runs per cell, cells, and perhaps peers."""
 
-    seeds: Annotated[int, Field(ge=1, le=10**5)]
+    seeds: Annotated[Whole, Field(ge=1, le=10**5)]
     grid: Annotated[tuple[Row, ...], BeforeValidator(_to_tuple)] = ()
     switches: Switches | None = None
     peers: Peers | None = None
@@ -140,9 +152,9 @@ class Search(Settings):
     protocol: Name
     variant: Name
     budget: Count
-    seeds: Annotated[int, Field(ge=1, le=1000)]
+    seeds: Annotated[Whole, Field(ge=1, le=1000)]
     root_seed: Seed
-    trials: Annotated[int, Field(ge=1, le=10**5)]
+    trials: Annotated[Whole, Field(ge=1, le=10**5)]
     fixed: dict[str, bool | int | float | str] = Field(default_factory=dict)
     space: Annotated[dict[str, Range | Choices], Field(min_length=1)]
 
@@ -193,8 +205,8 @@ class Study(Settings):
     """All cells of a configuration, and how they are trained, evaluated and shown."""
 
     root_seed: Seed
-    seeds: Annotated[int, Field(ge=1, le=10**5)]
-    seeds_per_block: Annotated[int, Field(ge=1, le=1000)]
+    seeds: Annotated[Whole, Field(ge=1, le=10**5)]
+    seeds_per_block: Annotated[Whole, Field(ge=1, le=1000)]
     protocols: Annotated[dict[Name, Protocol], BeforeValidator(_named), Field(min_length=1)]
     variants: Annotated[dict[Name, Variant], BeforeValidator(_named), Field(min_length=1)]
     grid: Rows
@@ -213,8 +225,6 @@ class Study(Settings):
             if name in RESERVED_FOLDERS:
                 raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
         for name, experiment in self.experiments.items():
-            if name in RESERVED_TARGETS:
-                raise ValueError(f"experiments: {name!r} is the name of another target; allowed: any other name")
             self._peers_have_partners(name, experiment)
         self._search_is_possible()
         known: dict[str, Cell] = {}
@@ -374,36 +384,13 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
     source: the path of a YAML file, or the mapping that such a file holds.
     Raises ConfigError, a single line, for the first thing that is wrong.
     """
-    content, name = (source, "config") if isinstance(source, Mapping) else (require_mapping(source), source)
+    content, name = (source, "config") if isinstance(source, Mapping) else (read_settings(source), source)
     try:
         return Study.model_validate(dict(content))
     except ValidationError as error:
         raise ConfigError(f"{name}: {flat(first_problem(error))}") from None
 
 
-class _UniqueKeys(yaml.SafeLoader):
-    """YAML in which no key of a mapping is there twice; plain YAML would take the last."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key, _ in node.value:
-            name = str(key.value)
-            if name in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"the key {name!r} is there twice", key.start_mark)
-            seen.add(name)
-        return super().construct_mapping(node, deep)
-
-
-def require_mapping(path: Path | str) -> Mapping[str, Any]:
-    """Read a YAML file that must hold a mapping with at least one key. Raises ConfigError."""
-    try:
-        content = yaml.load(Path(path).read_text(encoding="utf-8"), _UniqueKeys)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{path}: cannot be read as YAML: {flat(error)}") from None
-    if not content:
-        raise ConfigError(f"{path}: is empty; allowed: a mapping with the keys {', '.join(Study.model_fields)}")
-    if not isinstance(content, Mapping):
-        raise ConfigError(
-            f"{path}: {short(content)} is not a mapping; allowed: the keys {', '.join(Study.model_fields)}"
-        )
-    return content
+def read_settings(*paths: Path | str) -> dict[str, Any]:
+    """What YAML files say, each laid over those before it. Raises ConfigError."""
+    return merged({}, *(read_mapping(path, tuple(Study.model_fields)) for path in paths))
