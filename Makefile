@@ -11,17 +11,17 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare archive verify reference test check bench peers clean
+.PHONY: help setup reproduce quick report compare archive verify reference test check lock bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(READY) ## the virtual environment .venv with pinned packages
 
-$(READY): pyproject.toml requirements.txt
+$(READY): pyproject.toml requirements.txt workflow/install.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; name one: make PYTHON=python3.12")'
 	$(BIN)/python -m pip --version > /dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --requirement requirements.txt
+	$(BIN)/python workflow/install.py $(if $(ANY_TORCH),--any-torch)
 	$(BIN)/python -m pip install --quiet --no-deps --editable .
 	@touch $@
 
@@ -72,6 +72,9 @@ check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
 	snakefmt --check Snakefile workflow
 	mypy
 	python workflow/lint.py
+
+lock: $(READY) ## requirements.txt anew from the pins of pyproject.toml
+	uv pip compile --quiet pyproject.toml --output-file requirements.txt
 
 bench: $(READY) ## speed beside Stable-Baselines3 and the plain loop, into benchmarks/; leave the machine idle meanwhile
 	python benchmarks/run.py
