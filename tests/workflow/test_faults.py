@@ -32,7 +32,7 @@ STUDY = {
 def new_project(folder: Path) -> Project:
     """A study of two blocks that keep a checkpoint after every iteration."""
     project = Project(folder, STUDY)
-    jobs = folder / "src/reacher_shaping/jobs.py"
+    jobs = folder / "src/reacher_shaping/jobs/training_job.py"
     often = jobs.read_text().replace("SECONDS_PER_CHECKPOINT = 30.0", "SECONDS_PER_CHECKPOINT = 0.0")
     assert often != jobs.read_text()
     jobs.write_text(often)

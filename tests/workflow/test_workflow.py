@@ -255,8 +255,8 @@ def test_touching_every_source_reruns_nothing(project):
 
 def test_comment_docstring_and_layout_rerun_nothing(project):
     with (
-        project.edited("src/reacher_shaping/ppo.py", "\n\n\n", "\n\n\n# A comment.\n\n\n"),
-        project.edited("src/reacher_shaping/train.py", '"""Training', '"""The training'),
+        project.edited("src/reacher_shaping/training/ppo.py", "\n\n\n", "\n\n\n# A comment.\n\n\n"),
+        project.edited("src/reacher_shaping/training/train.py", '"""Training', '"""The training'),
         project.edited("workflow/scripts/train_block.py", '"""Train', '"""Now train'),
         project.edited("config.yaml", "seeds:", "# A comment.\nseeds:"),
     ):
@@ -264,15 +264,15 @@ def test_comment_docstring_and_layout_rerun_nothing(project):
 
 
 def test_edit_of_the_update_retrains_every_block(project):
-    with project.edited("src/reacher_shaping/ppo.py", "BETAS = (0.9, 0.999)", "BETAS = (0.9, 0.99)"):
+    with project.edited("src/reacher_shaping/training/ppo.py", "BETAS = (0.9, 0.999)", "BETAS = (0.9, 0.99)"):
         jobs = project.planned()
     assert len([name for name in jobs["train_block"] if name.endswith("policy.pt")]) == 4
 
 
 def test_edit_of_a_plot_redraws_and_does_not_train(project):
-    with project.edited("src/reacher_shaping/plots.py", "\n\n\n@mpl", "\n\n\ndef _new():\n    pass\n\n\n@mpl"):
+    with project.edited("src/reacher_shaping/figures/paper.py", "\n\n\n@mpl", "\n\n\ndef _new():\n    pass\n\n\n@mpl"):
         assert project.planned() == {}
-    with project.edited("src/reacher_shaping/plots.py", '"PPO iteration"', '"Iteration"'):
+    with project.edited("src/reacher_shaping/figures/paper.py", '"PPO iteration"', '"Iteration"'):
         jobs = project.planned()
     shown = {"plot_figures", "build_report", "build_crate"}
     assert shown <= set(jobs) <= shown | {"run_notebook"}
