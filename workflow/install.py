@@ -45,8 +45,9 @@ def main(any_torch: bool) -> None:
         subprocess.run([*PIP, "install", requirement], check=True)
     elif not install_cpu_torch(requirement):
         sys.exit(
-            f"{requirement}: for Python {sys.version_info.major}.{sys.version_info.minor} only the build for GPUs is offered "
-            "here, with 4 GB of packages that nothing uses, and PyTorch's own index of CPU builds cannot be reached. "
+            f"{requirement}: for Python {sys.version_info.major}.{sys.version_info.minor} only the build for GPUs is "
+            "offered here, with 4 GB of packages that nothing uses, and PyTorch's own index of CPU builds cannot be "
+            "reached. "
             "Name another Python (make setup PYTHON=python3.11), or take it: make setup ANY_TORCH=yes"
         )
 
