@@ -6,6 +6,9 @@ from typing import Any
 
 import pandas as pd
 
+CELL = ["variant", "budget", "alpha0"]
+KEY = ["protocol", *CELL]
+"""Columns that name a cell: within its protocol, and in the whole study."""
 Setting = tuple[int, float]  # budget in environment steps, alpha0
 
 

@@ -20,7 +20,7 @@ from reacher_shaping.jobs.checkpoint import save_checkpoint
 from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.cell import PPO
 from reacher_shaping.settings.study import Study, load_study
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import ArtifactError, read_table, write_table
 from reacher_shaping.storage.policy_format import write_policy
 from reacher_shaping.training.policy import Policy, initialise
@@ -149,7 +149,7 @@ def stored(tmp_path_factory) -> Path:
     save_checkpoint(folder / "checkpoint.pt", state)
     policy = Policy(initialise([0, 1], 0, PPO(hidden_units=64)), 64)
     write_policy(folder / "policy.pt", [0, 1], policy.weights(), {"cell": cell.settings()})
-    write_table(folder / "progress.parquet", state.progress_frame(), schemas.PROGRESS)
+    write_table(folder / "progress.parquet", state.progress_frame(), block_schemas.PROGRESS)
     return folder
 
 
@@ -187,11 +187,11 @@ def test_damaged_checkpoint_is_never_gone_on_from(stored, damage):
 @given(damage=mutations())
 def test_damaged_table_is_refused_or_read_as_it_was(stored, damage):
     content = (stored / "progress.parquet").read_bytes()
-    whole = read_table(stored / "progress.parquet", schemas.PROGRESS)
+    whole = read_table(stored / "progress.parquet", block_schemas.PROGRESS)
     path = stored / "damaged.parquet"
     path.write_bytes(damage(content))
     try:
-        found = read_table(path, schemas.PROGRESS)
+        found = read_table(path, block_schemas.PROGRESS)
     except ArtifactError as error:
         assert str(path) in str(error)
         assert "\n" not in str(error)

@@ -11,6 +11,7 @@ import pytest
 import torch
 from stable_baselines3.common.monitor import load_results
 
+from reacher_shaping.storage.block_schemas import EPISODES, PROGRESS
 from reacher_shaping.storage.files import (
     ArtifactError,
     exclusive,
@@ -24,7 +25,6 @@ from reacher_shaping.storage.files import (
     write_text,
 )
 from reacher_shaping.storage.policy_format import load_tensors, read_policy, write_policy
-from reacher_shaping.storage.schemas import EPISODES, PROGRESS
 
 
 def episodes(**columns):

@@ -21,28 +21,21 @@ published = "report/published"
 protocol = "paper"
 
 # %%
-from pathlib import Path
-
 from IPython.display import SVG, Markdown
 
 from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.report import captions
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_table
+from reacher_shaping.report.loader import load
 
-folder = Path(results)
-
-# %%
-cells = read_table(folder / "cells.parquet", schemas.CELLS)
-ours = read_table(folder / "correlation.csv", schemas.CORRELATION)
-published_correlation = read_table(folder / "correlation_published.csv", schemas.CORRELATION)
+study = load(results, published)
+cells, ours, theirs = (study.tables[name] for name in ("cells", "correlation", "correlation_published"))
 
 # %% [markdown]
 # Beside ours: the same code applied to the published Table 2.
 
 # %%
-SVG(to_bytes(paper.figure_3(ours, published_correlation, protocol), "svg"))
+SVG(to_bytes(paper.figure_3(ours, theirs, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_3", cells, protocol=protocol))

@@ -22,40 +22,21 @@ published = "report/published"
 protocol = "paper"
 
 # %%
-from pathlib import Path
-
-import pandas as pd
 from IPython.display import SVG, Markdown
 
 from reacher_shaping.figures import robustness
 from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.report import captions, paper_tables, seed_uncertainty, text_tables
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_table
+from reacher_shaping.report.loader import load
 
-folder = Path(results)
-
-# %%
-cells = read_table(folder / "cells.parquet", schemas.CELLS)
-runs = read_table(folder / "runs.parquet", schemas.RUNS)
-comparisons = read_table(folder / "comparisons.parquet", schemas.COMPARISONS)
-radii = read_table(folder / "radii.parquet", schemas.RADII)
-lengths = read_table(folder / "lengths.parquet", schemas.LENGTHS)
-power = read_table(folder / "power.parquet", schemas.POWER)
-variance = read_table(folder / "variance.parquet", schemas.VARIANCE)
-lottery = read_table(folder / "lottery.csv", schemas.LOTTERY)
-winners = read_table(folder / "winners.csv", schemas.WINNERS)
-spread = read_table(folder / "spread.csv", schemas.SPREAD)
-theirs = paper_tables.published_cells(
-    pd.read_csv(Path(published) / "table2.csv"),
-    pd.read_csv(Path(published) / "table3.csv"),
-)
+study = load(results, published)
+cells, runs = study.tables["cells"], study.tables["runs"]
 
 # %% [markdown]
 # ## Every run
 
 # %%
-SVG(to_bytes(robustness.seed_strip(runs, cells, theirs, protocol=protocol), "svg"))
+SVG(to_bytes(robustness.seed_strip(runs, cells, study.published, protocol=protocol), "svg"))
 
 # %%
 Markdown(captions.caption("seed_strip", cells, runs, protocol))
@@ -64,7 +45,7 @@ Markdown(captions.caption("seed_strip", cells, runs, protocol))
 # ## Differences to no shaping, paired by seed
 
 # %%
-SVG(to_bytes(robustness.forest(comparisons, protocol=protocol), "svg"))
+SVG(to_bytes(robustness.forest(study.tables["comparisons"], protocol=protocol), "svg"))
 
 # %%
 Markdown(captions.caption("forest", cells, runs, protocol))
@@ -73,7 +54,7 @@ Markdown(captions.caption("forest", cells, runs, protocol))
 # ## Does it hang on the radius?
 
 # %%
-SVG(to_bytes(robustness.success_by_radius(radii, protocol), "svg"))
+SVG(to_bytes(robustness.success_by_radius(study.tables["radii"], protocol), "svg"))
 
 # %%
 Markdown(captions.caption("success_by_radius", cells, runs, protocol))
@@ -82,7 +63,7 @@ Markdown(captions.caption("success_by_radius", cells, runs, protocol))
 # ## Longer episodes than in training
 
 # %%
-SVG(to_bytes(robustness.long_episodes(lengths, protocol, metric="final_distance"), "svg"))
+SVG(to_bytes(robustness.long_episodes(study.tables["lengths"], protocol, metric="final_distance"), "svg"))
 
 # %%
 Markdown(captions.caption("long_episodes", cells, runs, protocol))
@@ -109,31 +90,31 @@ Markdown(
 # The paper trained each cell once. Drawing one of our runs per cell, again and again, gives studies like it.
 
 # %%
-SVG(to_bytes(robustness.lottery(lottery), "svg"))
+SVG(to_bytes(robustness.lottery(study.tables["lottery"]), "svg"))
 
 # %%
 Markdown(captions.caption("lottery", cells, runs, protocol))
 
 # %%
-Markdown(seed_uncertainty.winners_sentence(winners))
+Markdown(seed_uncertainty.winners_sentence(study.tables["winners"]))
 
 # %%
-Markdown(text_tables.to_markdown(seed_uncertainty.winners_grid(winners)))
+Markdown(text_tables.to_markdown(seed_uncertainty.winners_grid(study.tables["winners"])))
 
 # %%
-Markdown(text_tables.to_markdown(seed_uncertainty.spread_grid(spread, theirs)))
+Markdown(text_tables.to_markdown(seed_uncertainty.spread_grid(study.tables["spread"], study.published)))
 
 # %% [markdown]
 # ## How many seeds does it take?
 
 # %%
-Markdown(seed_uncertainty.power_sentence(power, protocol))
+Markdown(seed_uncertainty.power_sentence(study.tables["power"], protocol))
 
 # %%
-Markdown(text_tables.to_markdown(seed_uncertainty.power_grid(power, protocol)))
+Markdown(text_tables.to_markdown(seed_uncertainty.power_grid(study.tables["power"], protocol)))
 
 # %%
-Markdown(seed_uncertainty.variance_sentence(variance, protocol))
+Markdown(seed_uncertainty.variance_sentence(study.tables["variance"], protocol))
 
 # %%
-Markdown(text_tables.to_markdown(seed_uncertainty.variance_grid(variance, protocol)))
+Markdown(text_tables.to_markdown(seed_uncertainty.variance_grid(study.tables["variance"], protocol)))

@@ -27,32 +27,18 @@ published = "report/published"
 protocol = "paper"
 
 # %%
-from pathlib import Path
-
-import pandas as pd
 from IPython.display import SVG, Markdown
 
 from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.report import captions, paper_tables
+from reacher_shaping.report.loader import load
 from reacher_shaping.report.summary import claims_markdown, summary, to_markdown
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_table
+from reacher_shaping.report.text import say
 
-folder = Path(results)
-
-# %%
-cells = read_table(folder / "cells.parquet", schemas.CELLS)
-runs = read_table(folder / "runs.parquet", schemas.RUNS)
-lines = read_table(folder / "curves.parquet", schemas.CURVES)
-correlation = read_table(folder / "correlation.csv", schemas.CORRELATION)
-published_correlation = read_table(folder / "correlation_published.csv", schemas.CORRELATION)
-claims_file = folder / "claims.csv"
-claims = read_table(claims_file, schemas.CLAIMS) if claims_file.exists() else None
-theirs = paper_tables.published_cells(
-    pd.read_csv(Path(published) / "table2.csv"),
-    pd.read_csv(Path(published) / "table3.csv"),
-)
+study = load(results, published)
+cells, runs, curves = (study.tables[name] for name in ("cells", "runs", "curves"))
+claims = study.tables.get("claims")
 
 # %% [markdown]
 # ## In short
@@ -72,7 +58,7 @@ ours.pivot(index="variant", columns=["budget", "alpha0"], values="seeds").astype
 # The environment's own return, without the shaping terms, iteration by iteration.
 
 # %%
-SVG(to_bytes(paper.figure_1(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_1(curves, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_1", cells, runs, protocol))
@@ -83,41 +69,41 @@ Markdown(captions.caption("figure_1", cells, runs, protocol))
 # that merely flails earns some successes too, so the tables also give success at the last step.
 
 # %%
-SVG(to_bytes(paper.figure_2(cells, theirs, protocol), "svg"))
+SVG(to_bytes(paper.figure_2(cells, study.published, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_2", cells, runs, protocol))
 
 # %%
-table = paper_tables.table_1(cells, theirs, protocol)
+table = paper_tables.table_1(cells, study.published, protocol)
 Markdown(paper_tables.to_markdown(table, captions.caption("table_1", cells, runs, protocol)))
 
 # %% [markdown]
 # ## Does a better return mean more success?
 
 # %%
-SVG(to_bytes(paper.figure_3(correlation, published_correlation, protocol), "svg"))
+SVG(to_bytes(paper.figure_3(study.tables["correlation"], study.tables["correlation_published"], protocol), "svg"))
 
 # %% [markdown]
 # ## The experiment of the appendix
 # Decayed shaping with the squared distance.
 
 # %%
-SVG(to_bytes(paper.figure_4(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_4(curves, protocol), "svg"))
 
 # %%
-table = paper_tables.table_3(cells, theirs, protocol)
+table = paper_tables.table_3(cells, study.published, protocol)
 Markdown(paper_tables.to_markdown(table, captions.caption("table_3", cells, runs, protocol)))
 
 # %% [markdown]
 # ## All cells
 
 # %%
-table = paper_tables.table_2(cells, theirs, protocol)
+table = paper_tables.table_2(cells, study.published, protocol)
 Markdown(paper_tables.to_markdown(table, captions.caption("table_2", cells, runs, protocol)))
 
 # %% [markdown]
 # ## Which claims stand
 
 # %%
-Markdown("The claims have not been tested in this study." if claims is None else claims_markdown(claims))
+Markdown(say("summary.untested_notebook") if claims is None else claims_markdown(claims))

@@ -21,29 +21,18 @@ published = "report/published"
 protocol = "paper"
 
 # %%
-from pathlib import Path
-
-import pandas as pd
 from IPython.display import SVG, Markdown
 
 from reacher_shaping.figures import paper, robustness
 from reacher_shaping.figures.style import to_bytes
-from reacher_shaping.report import captions, paper_tables
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_table
+from reacher_shaping.report import captions
+from reacher_shaping.report.loader import load
 
-folder = Path(results)
-
-# %%
-cells = read_table(folder / "cells.parquet", schemas.CELLS)
-runs = read_table(folder / "runs.parquet", schemas.RUNS)
-theirs = paper_tables.published_cells(
-    pd.read_csv(Path(published) / "table2.csv"),
-    pd.read_csv(Path(published) / "table3.csv"),
-)
+study = load(results, published)
+cells, runs = study.tables["cells"], study.tables["runs"]
 
 # %%
-SVG(to_bytes(paper.figure_2(cells, theirs, protocol), "svg"))
+SVG(to_bytes(paper.figure_2(cells, study.published, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_2", cells, runs, protocol))
@@ -53,4 +42,4 @@ Markdown(captions.caption("figure_2", cells, runs, protocol))
 # The same with a dot per seed: how far single runs of one cell lie apart.
 
 # %%
-SVG(to_bytes(robustness.seed_strip(runs, cells, theirs, protocol=protocol), "svg"))
+SVG(to_bytes(robustness.seed_strip(runs, cells, study.published, protocol=protocol), "svg"))

@@ -21,27 +21,22 @@ published = "report/published"
 protocol = "paper"
 
 # %%
-from pathlib import Path
-
 from IPython.display import SVG, Markdown
 
 from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import to_bytes
+from reacher_shaping.labels import CELL
 from reacher_shaping.report import captions
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_table
+from reacher_shaping.report.loader import load
 
-folder = Path(results)
-
-# %%
-cells = read_table(folder / "cells.parquet", schemas.CELLS)
-lines = read_table(folder / "curves.parquet", schemas.CURVES)
+study = load(results, published)
+cells, curves = study.tables["cells"], study.tables["curves"]
 
 # %% [markdown]
 # ## Constant and decayed shaping with the plain distance, and L2² with a constant weight
 
 # %%
-SVG(to_bytes(paper.figure_1(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_1(curves, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_1", cells, protocol=protocol))
@@ -50,7 +45,7 @@ Markdown(captions.caption("figure_1", cells, protocol=protocol))
 # ## Decayed shaping with the squared distance
 
 # %%
-SVG(to_bytes(paper.figure_4(lines, protocol), "svg"))
+SVG(to_bytes(paper.figure_4(curves, protocol), "svg"))
 
 # %%
 Markdown(captions.caption("figure_4", cells, protocol=protocol))
@@ -59,6 +54,6 @@ Markdown(captions.caption("figure_4", cells, protocol=protocol))
 # ## Where each curve has its highest point
 
 # %%
-lines = lines[lines["protocol"] == protocol].dropna(subset="episode_return")
-highest = lines.groupby(["variant", "budget", "alpha0"])["episode_return"].idxmax()
-lines.loc[highest, ["variant", "budget", "alpha0", "iteration", "episode_return", "low", "high"]].reset_index(drop=True)
+curves = curves[curves["protocol"] == protocol].dropna(subset="episode_return")
+highest = curves.groupby(CELL)["episode_return"].idxmax()
+curves.loc[highest, [*CELL, "iteration", "episode_return", "low", "high"]].reset_index(drop=True)

@@ -1,23 +1,5 @@
 # From the blocks' tables to the study's: runs, cells, learning curves, correlations, claims.
-TABLES = [
-    "results/runs.parquet",
-    "results/cells.parquet",
-    "results/curves.parquet",
-    "results/correlation.csv",
-    "results/correlation_published.csv",
-    "results/claims.csv",
-    "results/claim_parts.csv",
-    "results/controllers.parquet",
-    "results/radii.parquet",
-    "results/long_episodes.parquet",
-    "results/lengths.parquet",
-    "results/comparisons.parquet",
-    "results/variance.parquet",
-    "results/power.parquet",
-    "results/lottery.csv",
-    "results/winners.csv",
-    "results/spread.csv",
-]
+TABLES = [f"results/{entry.file}" for entry in STUDY_TABLES.values() if entry.always]
 BLOCK_CELLS = block_cells(STUDY.cells, STUDY.seeds)
 PUBLISHED = {
     "table2": source("report/published/table2.csv"),
@@ -35,9 +17,7 @@ rule aggregate_runs:
         progress=expand("{block}/progress.parquet", block=BLOCKS),
         episodes=expand("{block}/episodes.parquet", block=BLOCKS),
     output:
-        runs="results/runs.parquet",
-        cells="results/cells.parquet",
-        curves="results/curves.parquet",
+        **tables_made("aggregate_runs"),
     log:
         "results/logs/aggregate_runs.log",
     benchmark:
@@ -54,10 +34,9 @@ rule aggregate_runs:
 rule correlate:
     input:
         **PUBLISHED,
-        runs="results/runs.parquet",
+        **tables_read("correlate"),
     output:
-        study="results/correlation.csv",
-        published="results/correlation_published.csv",
+        **tables_made("correlate"),
     log:
         "results/logs/correlate.log",
     benchmark:
@@ -75,9 +54,7 @@ rule summarise_episodes:
         episodes=expand("{block}/episodes.parquet", block=BLOCKS),
         long_episodes=expand("{block}/long_episodes.parquet", block=BLOCKS),
     output:
-        radii="results/radii.parquet",
-        long_episodes="results/long_episodes.parquet",
-        lengths="results/lengths.parquet",
+        **tables_made("summarise_episodes"),
     log:
         "results/logs/summarise_episodes.log",
     benchmark:
@@ -94,14 +71,9 @@ rule summarise_episodes:
 rule compare_runs:
     input:
         **PUBLISHED,
-        runs="results/runs.parquet",
+        **tables_read("compare_runs"),
     output:
-        comparisons="results/comparisons.parquet",
-        variance="results/variance.parquet",
-        power="results/power.parquet",
-        lottery="results/lottery.csv",
-        winners="results/winners.csv",
-        spread="results/spread.csv",
+        **tables_made("compare_runs"),
     log:
         "results/logs/compare_runs.log",
     benchmark:
@@ -117,8 +89,7 @@ rule compare_runs:
 
 rule check_results:
     input:
-        runs="results/runs.parquet",
-        cells="results/cells.parquet",
+        **tables_read("check_results"),
     output:
         "results/check.txt",
     log:
@@ -138,13 +109,11 @@ rule check_results:
 rule judge_claims:
     input:
         **PUBLISHED,
-        runs="results/runs.parquet",
-        long_episodes="results/long_episodes.parquet",
+        **tables_read("judge_claims"),
         peers=PEERS,
         ledger=source("report/claims.yaml"),
     output:
-        claims="results/claims.csv",
-        parts="results/claim_parts.csv",
+        **tables_made("judge_claims"),
     log:
         "results/logs/judge_claims.log",
     benchmark:

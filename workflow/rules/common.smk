@@ -8,6 +8,7 @@ from reacher_shaping.settings.base import ConfigError, short
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.settings.yaml_file import merged
 from reacher_shaping.storage.code_hash import code_hash
+from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES, made_by, read_by
 
 os.environ.update(OMP_NUM_THREADS="1")  # one thread a job; Snakemake fills the cores with jobs
 
@@ -40,6 +41,18 @@ def source(path):
 
 
 WORDS = source("src/reacher_shaping/report/text.yaml")
+
+
+def tables_made(rule, experiment=None):
+    """The tables that a rule makes, by name: its output."""
+    if experiment:
+        return made_by(rule, EXPERIMENT_TABLES, f"results/experiments/{experiment}")
+    return made_by(rule, STUDY_TABLES, "results")
+
+
+def tables_read(rule):
+    """The study-wide tables that a rule reads, by name: its input."""
+    return read_by(rule, STUDY_TABLES, "results")
 
 
 def code(script):

@@ -45,7 +45,7 @@ rule evaluate_long:
 
 rule evaluate_controllers:
     output:
-        "results/controllers.parquet",
+        **tables_made("evaluate_controllers"),
     log:
         "results/logs/evaluate_controllers.log",
     benchmark:

@@ -15,9 +15,7 @@ use rule aggregate_runs as aggregate_experiment with:
         progress=of_blocks("progress.parquet"),
         episodes=of_blocks("episodes.parquet"),
     output:
-        runs="results/experiments/{experiment}/runs.parquet",
-        cells="results/experiments/{experiment}/cells.parquet",
-        curves="results/experiments/{experiment}/curves.parquet",
+        **tables_made("aggregate_experiment", "{experiment}"),
     log:
         "results/logs/experiments/{experiment}/aggregate.log",
     benchmark:
@@ -30,7 +28,7 @@ use rule aggregate_runs as aggregate_experiment with:
 
 use rule evaluate_controllers as evaluate_experiment_controllers with:
     output:
-        "results/experiments/{experiment}/controllers.parquet",
+        **tables_made("evaluate_experiment_controllers", "{experiment}"),
     log:
         "results/logs/experiments/{experiment}/controllers.log",
     benchmark:
@@ -83,10 +81,7 @@ rule summarise_experiment:
         runs="results/experiments/{experiment}/runs.parquet",
         progress=of_blocks("progress.parquet"),
     output:
-        logs="results/experiments/{experiment}/logs.parquet",
-        logged="results/experiments/{experiment}/logged.parquet",
-        comparisons="results/experiments/{experiment}/comparisons.parquet",
-        correlation="results/experiments/{experiment}/correlation.csv",
+        **tables_made("summarise_experiment", "{experiment}"),
     log:
         "results/logs/experiments/{experiment}/summarise.log",
     benchmark:
@@ -104,7 +99,7 @@ rule measure_effects:
     input:
         runs="results/experiments/{experiment}/runs.parquet",
     output:
-        "results/experiments/{experiment}/effects.csv",
+        **tables_made("measure_effects", "{experiment}"),
     log:
         "results/logs/experiments/{experiment}/effects.log",
     benchmark:
@@ -126,7 +121,7 @@ rule compare_with_peers:
         runs="results/experiments/{experiment}/runs.parquet",
         peers=lambda wildcards: peers_of(wildcards.experiment),
     output:
-        "results/experiments/{experiment}/agreement.csv",
+        **tables_made("compare_with_peers", "{experiment}"),
     log:
         "results/logs/experiments/{experiment}/agreement.log",
     benchmark:

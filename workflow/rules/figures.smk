@@ -16,11 +16,7 @@ FORMATTED_TABLES = expand(
 rule plot_figures:
     input:
         **PUBLISHED,
-        cells="results/cells.parquet",
-        curves="results/curves.parquet",
-        correlation="results/correlation.csv",
-        published_correlation="results/correlation_published.csv",
-        controllers="results/controllers.parquet",
+        **tables_read("plot_figures"),
     output:
         FIGURES,
     log:
@@ -37,13 +33,7 @@ rule plot_figures:
 rule plot_further:
     input:
         **PUBLISHED,
-        runs="results/runs.parquet",
-        cells="results/cells.parquet",
-        comparisons="results/comparisons.parquet",
-        radii="results/radii.parquet",
-        lengths="results/lengths.parquet",
-        lottery="results/lottery.csv",
-        controllers="results/controllers.parquet",
+        **tables_read("plot_further"),
         peers=PEERS,
     output:
         FURTHER_FIGURES,
@@ -62,8 +52,7 @@ rule plot_further:
 rule format_tables:
     input:
         **PUBLISHED,
-        runs="results/runs.parquet",
-        cells="results/cells.parquet",
+        **tables_read("format_tables"),
         words=WORDS,
     output:
         FORMATTED_TABLES,

@@ -39,7 +39,7 @@ rule gather_peers:
     input:
         PEER_RUNS,
     output:
-        "results/peers.parquet",
+        **tables_made("gather_peers"),
     log:
         "results/logs/gather_peers.log",
     benchmark:

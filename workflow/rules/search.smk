@@ -4,7 +4,7 @@ if STUDY.search:
 
     rule search:
         output:
-            "results/search/trials.csv",
+            **tables_made("search"),
         log:
             "results/logs/search.log",
         benchmark:

@@ -5,7 +5,7 @@ from job import logged
 
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.analysis.runs import cells_frame, runs_frame
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas, schemas
 from reacher_shaping.storage.files import read_table, write_table
 from reacher_shaping.storage.provenance import unchanged
 
@@ -16,14 +16,14 @@ with logged(snakemake.log[0]):
     blocks = (
         (
             cell,
-            read_table(unchanged(progress), schemas.PROGRESS),
-            read_table(unchanged(episodes), schemas.EPISODES),
+            read_table(unchanged(progress), block_schemas.PROGRESS),
+            read_table(unchanged(episodes), block_schemas.EPISODES),
         )
         for cell, progress, episodes in files
     )
     runs = runs_frame(blocks)
     progress = pd.concat(
-        [read_table(path, schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
+        [read_table(path, block_schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
     )
     write_table(output.runs, runs, schemas.RUNS)
     write_table(output.cells, cells_frame(runs, params.root_seed), schemas.CELLS)

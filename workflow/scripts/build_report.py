@@ -9,7 +9,8 @@ from job import logged
 
 from reacher_shaping.report import html, paper_tables
 from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_json, read_studies, read_table, write_text
+from reacher_shaping.storage.files import read_json, read_table, write_text
+from reacher_shaping.storage.reference import read_studies
 
 given, params = snakemake.input, snakemake.params
 

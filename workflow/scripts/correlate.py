@@ -16,5 +16,5 @@ with logged(snakemake.log[0]):
     published = paper_tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))
     main_grid = published[in_table_2(published)]
     theirs = correlations(main_grid, "cells", generator(root_seed, "published"))
-    write_table(snakemake.output.study, correlation_frame(runs, root_seed), schemas.CORRELATION)
-    write_table(snakemake.output.published, theirs.assign(protocol="published"), schemas.CORRELATION)
+    write_table(snakemake.output.correlation, correlation_frame(runs, root_seed), schemas.CORRELATION)
+    write_table(snakemake.output.correlation_published, theirs.assign(protocol="published"), schemas.CORRELATION)

@@ -10,7 +10,7 @@ from job import logged
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.settings.study import Evaluation
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import read_json, write_json, write_table
 from reacher_shaping.storage.policy_format import read_policy
 from reacher_shaping.storage.provenance import Record, merged_manifest, unchanged
@@ -39,7 +39,7 @@ with logged(snakemake.log[0]):
         for mode in ("stochastic", "deterministic")
     ]
     episodes = pd.concat(frames, ignore_index=True)
-    write_table(snakemake.output.episodes, episodes, schemas.EPISODES)
+    write_table(snakemake.output.episodes, episodes, block_schemas.EPISODES)
     files = [Path(snakemake.output.episodes)]
     part = record.to_dict(block, [Path(snakemake.input.policy)], files, 50 * len(episodes), snakemake.threads)
     part = {"settings": json.loads(params.evaluation), "code": params.code, **part}

@@ -6,7 +6,7 @@ from job import logged
 from reacher_shaping.evaluation.episode_lengths import evaluate_lengths
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.settings.study import Evaluation
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import write_table
 from reacher_shaping.storage.policy_format import read_policy
 from reacher_shaping.storage.provenance import unchanged
@@ -27,4 +27,4 @@ with logged(snakemake.log[0]):
         clip_actions=environment.clip_actions,
         root_seed=params.root_seed,
     )
-    write_table(snakemake.output[0], long, schemas.LONG_EPISODES)
+    write_table(snakemake.output[0], long, block_schemas.LONG_EPISODES)

@@ -21,5 +21,5 @@ with logged(snakemake.log[0]):
     peers = read_table(given.peers[0], schemas.PEERS) if given.peers else None
     measured = claims.measure(runs, snakemake.params.root_seed, peers=peers, long_episodes=long)
     parts = claims.assess(ledger, measured, claims.published_estimates(published))
-    write_table(snakemake.output.parts, parts, schemas.CLAIM_PARTS)
+    write_table(snakemake.output.claim_parts, parts, schemas.CLAIM_PARTS)
     write_table(snakemake.output.claims, claims.claims_frame(ledger, parts), schemas.CLAIMS)

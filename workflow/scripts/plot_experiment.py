@@ -6,7 +6,7 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping.figures import studies
-from reacher_shaping.storage.files import read_studies
+from reacher_shaping.storage.reference import read_studies
 
 given, wildcards = snakemake.input, snakemake.wildcards
 

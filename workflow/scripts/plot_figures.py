@@ -17,7 +17,7 @@ with logged(snakemake.log[0]):
     cells = read_table(given.cells, schemas.CELLS)
     curves = read_table(given.curves, schemas.CURVES)
     correlation = read_table(given.correlation, schemas.CORRELATION)
-    theirs = read_table(given.published_correlation, schemas.CORRELATION)
+    theirs = read_table(given.correlation_published, schemas.CORRELATION)
     controllers = read_table(given.controllers, schemas.CONTROLLERS)
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     figures = {

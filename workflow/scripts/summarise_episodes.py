@@ -4,7 +4,7 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping.analysis.runs import length_cells, radius_cells, radius_frame
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas, schemas
 from reacher_shaping.storage.files import read_table, write_table
 from reacher_shaping.storage.provenance import unchanged
 
@@ -12,14 +12,14 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
     episodes = (
-        (cell, read_table(unchanged(path), schemas.EPISODES))
+        (cell, read_table(unchanged(path), block_schemas.EPISODES))
         for cell, path in zip(params.cells, given.episodes, strict=True)
     )
     radii = radius_cells(radius_frame(episodes), params.root_seed)
     write_table(output.radii, radii, schemas.RADII)
     long = pd.concat(
         [
-            read_table(path, schemas.LONG_EPISODES).assign(**cell)
+            read_table(path, block_schemas.LONG_EPISODES).assign(**cell)
             for cell, path in zip(params.cells, given.long_episodes, strict=True)
         ],
         ignore_index=True,

@@ -5,7 +5,7 @@ from job import logged
 
 from reacher_shaping.analysis import comparisons, learning_curves, switch_effects
 from reacher_shaping.report import paper_tables
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas, schemas
 from reacher_shaping.storage.files import read_table, write_table
 from reacher_shaping.storage.provenance import unchanged
 
@@ -14,7 +14,7 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 with logged(snakemake.log[0]):
     runs = read_table(given.runs, schemas.RUNS)
     blocks = zip(params.cells, given.progress, strict=True)
-    parts = [read_table(unchanged(path), schemas.PROGRESS).assign(**cell) for cell, path in blocks]
+    parts = [read_table(unchanged(path), block_schemas.PROGRESS).assign(**cell) for cell, path in blocks]
     progress = pd.concat(parts, ignore_index=True)
     write_table(output.logs, switch_effects.logs_frame(progress), schemas.LOGS)
     logged_curves = learning_curves.curve_table(progress, column="logged_return")

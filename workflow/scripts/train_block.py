@@ -8,7 +8,7 @@ from job import logged
 
 from reacher_shaping.jobs import training_job
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.code_hash import reached_files
 from reacher_shaping.storage.files import write_json, write_monitors, write_table
 from reacher_shaping.storage.policy_format import write_policy
@@ -28,7 +28,7 @@ with logged(snakemake.log[0]) as say:
     ) as (state, _):
         weights = state.policy(cell).weights()
         write_policy(output.policy, params.seeds, weights, settings)
-        write_table(output.progress, state.progress_frame(), schemas.PROGRESS)
+        write_table(output.progress, state.progress_frame(), block_schemas.PROGRESS)
         write_monitors(output.monitor, state.episodes_frame())
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
         steps = state.iteration * cell.protocol.ppo.rollout_steps * len(params.seeds)

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from reacher_shaping import stats
-from reacher_shaping.analysis.runs import KEY
+from reacher_shaping.labels import KEY
 
 COMPARED = ("success_rate", "mean_return")
 LEVEL = 0.05

@@ -20,6 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from reacher_shaping import stats
+from reacher_shaping.labels import CELL
 
 Array = NDArray[np.float64]
 Cell = tuple[str, int, float]
@@ -72,7 +73,7 @@ class Sample:
     """The runs of one protocol under bootstrap resamples of the seeds."""
 
     def __init__(self, runs: pd.DataFrame, random: np.random.Generator, resamples: int = stats.RESAMPLES) -> None:
-        key = ["seed", "variant", "budget", "alpha0"]
+        key = ["seed", *CELL]
         metrics = runs.drop(columns=key).select_dtypes("number")
         table = metrics.set_index(pd.MultiIndex.from_frame(runs[key])).unstack(key[1:]).sort_index()
         self._columns = {column: values.to_numpy(dtype=float) for column, values in table.items()}

@@ -14,6 +14,7 @@ import pandas as pd
 
 from reacher_shaping import stats
 from reacher_shaping.analysis import claim_estimates as e
+from reacher_shaping.labels import CELL
 from reacher_shaping.random_streams import generator
 
 REPRODUCED = "reproduced"
@@ -90,7 +91,7 @@ def estimate(claim: str, sample: e.Sample | None) -> e.Estimates:
 
 def widen(long_episodes: pd.DataFrame) -> pd.DataFrame:
     """Runs x episode lengths (`steps`, `final_distance`) -> a row per run with `final_distance_<steps>`."""
-    key = ["variant", "budget", "alpha0", "seed"]
+    key = [*CELL, "seed"]
     wide = long_episodes.pivot_table(index=key, columns="steps", values="final_distance")
     return wide.add_prefix("final_distance_").reset_index()
 

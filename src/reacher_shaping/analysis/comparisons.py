@@ -21,7 +21,8 @@ import pandas as pd
 
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
-from reacher_shaping.analysis.runs import KEY, Block, curve_array
+from reacher_shaping.analysis.runs import Block, curve_array
+from reacher_shaping.labels import CELL, KEY
 from reacher_shaping.random_streams import generator
 
 METRICS = ("success_rate", "mean_return", "final_success_rate", "final_distance")
@@ -120,7 +121,7 @@ def power_frame(runs: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
     `published`: `variant, budget, alpha0, success_rate`. Columns: the key, published_gain, deviation (of our
     paired differences), seeds, power (with those seeds), power_3, seeds_needed (80 % power, paired t test at 5 %).
     """
-    theirs = published.set_index(["variant", "budget", "alpha0"])["success_rate"].to_dict()
+    theirs = published.set_index(CELL)["success_rate"].to_dict()
     rates = {tuple(key): own.set_index("seed")["success_rate"] for key, own in runs.groupby(KEY)}
     columns = [*KEY, "published_gain", "deviation", "seeds", "power", "power_3", "seeds_needed"]
     rows = []

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping import stats
-from reacher_shaping.analysis.runs import KEY
+from reacher_shaping.labels import KEY
 from reacher_shaping.random_streams import generator
 
 CORRELATED = ["alpha0", "success_rate", "mean_return", "budget"]

@@ -29,7 +29,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-CELL = ["protocol", "variant", "budget", "alpha0"]
+from reacher_shaping.labels import KEY
 
 
 def curve_table(progress: pd.DataFrame, confidence: float = 0.95, column: str = "episode_return") -> pd.DataFrame:
@@ -41,7 +41,7 @@ def curve_table(progress: pd.DataFrame, confidence: float = 0.95, column: str = 
     missing, so `seeds` is the number of runs behind a point; one seed gives no band (NaN).
     """
     finite = progress.assign(episode_return=progress[column].replace([np.inf, -np.inf], np.nan))
-    keys = [*CELL, "iteration", "env_steps"]
+    keys = [*KEY, "iteration", "env_steps"]
     found = finite.groupby(keys, sort=True)["episode_return"].agg(["mean", "sem", "count"])
     degrees = (found["count"] - 1).clip(lower=1)
     half_width = found["sem"] * stats.t.ppf(0.5 + confidence / 2, degrees)

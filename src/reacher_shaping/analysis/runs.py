@@ -19,10 +19,10 @@ from numpy.typing import ArrayLike
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.evaluation.metrics import EVALUATION, evaluation_metrics
+from reacher_shaping.labels import KEY
 from reacher_shaping.random_streams import generator
 
 Block = tuple[Mapping[str, Any], pd.DataFrame, pd.DataFrame]
-KEY = ["protocol", "variant", "budget", "alpha0"]
 CURVE = ["peak_return", "peak_iteration", "final_return", "drop_from_peak", "roughness", "area_under_curve"]
 METRICS = EVALUATION + [f"deterministic_{name}" for name in EVALUATION] + CURVE + ["steps_to_threshold", "action_std"]
 RUNS = [*KEY, "seed", "episodes", *METRICS, "diverged"]

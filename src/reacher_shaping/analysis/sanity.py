@@ -5,7 +5,8 @@ from typing import Any
 
 import pandas as pd
 
-CELL = ["protocol", "variant", "budget", "alpha0"]
+from reacher_shaping.labels import KEY
+
 RATES = ["success_rate", "final_success_rate", "deterministic_success_rate", "deterministic_final_success_rate"]
 DISTANCES = ["final_distance", "min_distance"]
 REACH = 0.5  # m; more than the arm's 0.21 plus the farthest target's 0.28
@@ -20,9 +21,9 @@ def problems(
     """
     found = []
     wanted = pd.MultiIndex.from_tuples(
-        [(*(cell[name] for name in CELL), seed) for cell in expected for seed in range(seeds)]
+        [(*(cell[name] for name in KEY), seed) for cell in expected for seed in range(seeds)]
     )
-    given = pd.MultiIndex.from_frame(runs[[*CELL, "seed"]])
+    given = pd.MultiIndex.from_frame(runs[[*KEY, "seed"]])
     found += [f"run {key} is missing" for key in wanted.difference(given)]
     found += [f"run {key} is not in the study" for key in given.difference(wanted)]
     if len(cells) != len(expected):
@@ -41,5 +42,5 @@ def problems(
 
 
 def _offending(runs: pd.DataFrame, where: "pd.Series[bool]", what: str) -> list[str]:
-    keys = runs.loc[where, [*CELL, "seed"]].itertuples(index=False, name=None)
+    keys = runs.loc[where, [*KEY, "seed"]].itertuples(index=False, name=None)
     return [f"run {key} {what}" for key in keys]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from reacher_shaping import stats
 from reacher_shaping.analysis.claim_estimates import BEST, LONG, SHAPED, SHORT, TABLE_2
+from reacher_shaping.labels import CELL
 
 Array = NDArray[np.float64]
 CORRELATIONS = ["r_alpha_return", "r_success_return", "r_success_budget"]
@@ -52,7 +53,7 @@ def single_seed_studies(runs: pd.DataFrame, random: np.random.Generator, studies
     """
     columns = ["best_variant", "best_budget", "best_alpha0", "best_success", "ratio", *CORRELATIONS, *STATEMENTS]
     known = runs.dropna(subset=["success_rate", "mean_return"]).sort_values("seed")
-    found = dict(iter(known.groupby(["variant", "budget", "alpha0"])))
+    found = dict(iter(known.groupby(CELL)))
     if not set(TABLE_2) <= set(found):
         return pd.DataFrame(columns=columns)
     drawn = []

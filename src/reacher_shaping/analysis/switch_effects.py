@@ -22,7 +22,7 @@ import pandas as pd
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.analysis.correlation import CORRELATED, correlations, in_table_2
-from reacher_shaping.analysis.runs import KEY
+from reacher_shaping.labels import KEY
 from reacher_shaping.random_streams import generator
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.study import Switches

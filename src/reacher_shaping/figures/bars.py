@@ -12,6 +12,7 @@ from matplotlib.ticker import PercentFormatter
 
 from reacher_shaping.figures.style import STYLE, empty_panel, variant_color
 from reacher_shaping.labels import (
+    CELL,
     Setting,
     in_groups,
     of_protocol,
@@ -62,7 +63,7 @@ def _draw_bars(axes: Axes, cells: pd.DataFrame, published: pd.DataFrame, shades:
     here = settings_of(cells)
     width = min(0.8 / len(here), 0.4)
     variants = sorted(cells["variant"].unique(), key=variant_order)
-    theirs = published.set_index(["variant", "budget", "alpha0"])["success_rate"].to_dict()
+    theirs = published.set_index(CELL)["success_rate"].to_dict()
     for cell in cells.to_dict("records"):
         setting = (int(cell["budget"]), float(cell["alpha0"]))
         x = variants.index(cell["variant"]) + (here.index(setting) - (len(here) - 1) / 2) * width

@@ -14,6 +14,7 @@ from matplotlib.ticker import PercentFormatter
 from reacher_shaping.figures.bars import PUBLISHED
 from reacher_shaping.figures.style import STYLE, empty_panel, variant_color
 from reacher_shaping.labels import (
+    CELL,
     budget_label,
     cell_order,
     of_protocol,
@@ -38,7 +39,6 @@ CROSS: dict[str, Any] = {
     "markersize": 6.5,
     "markeredgewidth": 1.8,
 }
-CELL = ["variant", "budget", "alpha0"]
 AXIS_LABELS = {
     "success_rate": "Success rate: within the radius at any step",
     "final_success_rate": "Success rate at the last step",

@@ -16,7 +16,7 @@ from reacher_shaping.analysis.learning_curves import smooth
 from reacher_shaping.figures import paper, robustness
 from reacher_shaping.figures.bars import PUBLISHED
 from reacher_shaping.figures.style import STYLE, empty_panel, save, variant_color
-from reacher_shaping.labels import cell_order, setting_label, stochastic, variant_label, variant_order
+from reacher_shaping.labels import KEY, cell_order, setting_label, stochastic, variant_label, variant_order
 
 __all__ = ["cells", "correlation", "draw", "effects", "forest", "log", "save"]
 STRIP = {
@@ -70,11 +70,11 @@ def cells(runs: pd.DataFrame, table: pd.DataFrame, controllers: pd.DataFrame | N
     rows = sorted(table.to_dict("records"), key=lambda row: (order.index(row["protocol"]), *cell_order(row)))
     figure = Figure(figsize=(11.0, 1.4 + 0.27 * max(len(rows), 4)))
     panels = figure.subplots(1, len(STRIP), sharey=True)
-    by_cell = dict(iter(runs.groupby(["protocol", *robustness.CELL])))
+    by_cell = dict(iter(runs.groupby(KEY)))
     ceilings = {protocol: _controller(controllers, protocol) for protocol in order}
     for axes, (metric, label) in zip(panels, STRIP.items(), strict=True):
         for y, row in enumerate(rows):
-            own = by_cell[tuple(row[name] for name in ("protocol", *robustness.CELL))]
+            own = by_cell[tuple(row[name] for name in KEY)]
             robustness.draw_runs(axes, y, own, row, metric, variant_color(row["variant"]))
             ceiling = ceilings[row["protocol"]]
             if metric in ceiling:

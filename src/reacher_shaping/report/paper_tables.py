@@ -6,11 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping.labels import budget_label, cell_order, in_groups, number, of_protocol, variant_label
+from reacher_shaping.labels import CELL, budget_label, cell_order, in_groups, number, of_protocol, variant_label
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.storage.files import write_text
 
-CELL = ["variant", "budget", "alpha0"]
 MEASURED = ("success_rate", "mean_return", "final_success_rate", "final_distance")
 MAIN_GRID = ("none", "constant", "decay")
 BUDGETS = {"500K": 500_000, "1M": 1_000_000}

@@ -10,8 +10,7 @@ import pandas as pd
 from reacher_shaping.report import paper_tables, study_sections
 from reacher_shaping.report.summary import summary
 from reacher_shaping.report.text import entry, say
-from reacher_shaping.storage.files import read_studies
-from reacher_shaping.storage.reference import _spent
+from reacher_shaping.storage.reference import _spent, read_studies
 
 _BLOCK = re.compile(r"(<!-- reference: begin -->\n).*(<!-- reference: end -->)", re.DOTALL)
 

@@ -6,7 +6,16 @@ from typing import Any
 import pandas as pd
 
 from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
-from reacher_shaping.labels import budget_label, cell_order, number, of_protocol, setting_label, variant_label
+from reacher_shaping.labels import (
+    CELL,
+    KEY,
+    budget_label,
+    cell_order,
+    number,
+    of_protocol,
+    setting_label,
+    variant_label,
+)
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid, of_table
@@ -87,7 +96,7 @@ def _main_correlation(main: pd.DataFrame | None, x: str, y: str) -> str:
 def beside(cells: pd.DataFrame, published: pd.DataFrame) -> Grid:
     """A row per published run: its success and return, and ours of the cell of the same label."""
     rows = []
-    joined = published.merge(cells, on=paper_tables.CELL, suffixes=("_published", ""))
+    joined = published.merge(cells, on=CELL, suffixes=("_published", ""))
     for row in sorted(joined.to_dict("records"), key=cell_order):
         texts = [str(row["run"]), variant_label(row["variant"]), setting_label(int(row["budget"]), row["alpha0"])]
         for metric in ("success_rate", "mean_return"):
@@ -106,7 +115,7 @@ def logs(table: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
         return f"{mean} [{low}, {high}]"
 
     rows = []
-    groups = table.groupby(["protocol", "variant", "budget", "alpha0"], sort=False)
+    groups = table.groupby(KEY, sort=False)
     ordered = sorted(groups, key=lambda group: (group[1]["protocol"].iloc[0], cell_order(group[1].iloc[0].to_dict())))
     for _, own in ordered:
         cell = own.iloc[0].to_dict()

@@ -3,22 +3,15 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from reacher_shaping.storage.tables import EXPERIMENT_TABLES
+
 VIEWS = ("cells", "effects", "log", "correlation", "forest")
-COMMON_TABLES = (
-    "runs.parquet",
-    "cells.parquet",
-    "curves.parquet",
-    "logs.parquet",
-    "logged.parquet",
-    "comparisons.parquet",
-    "correlation.csv",
-    "controllers.parquet",
-)
 
 
 def table_files(*, switches: bool, peers: bool) -> list[str]:
     """Return the files of a study's tables: those of all, and of one that has `switches` or `peers`."""
-    return [*COMMON_TABLES, *(["effects.csv"] if switches else []), *(["agreement.csv"] if peers else [])]
+    has = {"effects": switches, "agreement": peers}
+    return [entry.file for name, entry in EXPERIMENT_TABLES.items() if has.get(name, True)]
 
 
 def views(keys: Iterable[Mapping[str, Any]], *, switches: bool) -> list[str]:

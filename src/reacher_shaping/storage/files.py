@@ -12,19 +12,16 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from reacher_shaping.storage.schemas import INTEGER, STUDY_TABLES, Table
-
-if TYPE_CHECKING:
-    pass
+from reacher_shaping.storage.block_schemas import INTEGER, NUMBER, Table
 
 SECONDS_PER_STEP = 0.02  # simulated time of one environment step: two MuJoCo steps of 0.01 s
 
@@ -146,7 +143,7 @@ def read_table(path: Path | str, table: Table) -> pd.DataFrame:
             arrow = _to_arrow(frame, table, path)
         else:
             arrow = pq.read_table(path, page_checksum_verification=True)
-            if not arrow.schema.equals(table.schema(arrow.column_names)):
+            if not arrow.schema.equals(_schema(table, arrow.column_names)):
                 raise ValueError("a column has another type")
         content: pd.DataFrame = arrow.to_pandas()
         return content
@@ -186,14 +183,6 @@ def write_monitors(folder: Path | str, episodes: pd.DataFrame) -> None:
         write_text(Path(folder) / f"{seed}.monitor.csv", "\n".join([f"#{header}", "r,l,t", *lines, ""]))
 
 
-def read_studies(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
-    """The tables of further studies by study and name, from their files. Raises ArtifactError."""
-    found: dict[str, dict[str, pd.DataFrame]] = {}
-    for path in map(Path, paths):
-        found.setdefault(path.parent.name, {})[path.stem] = read_table(path, STUDY_TABLES[path.stem])
-    return found
-
-
 @contextmanager
 def exclusive(path: Path | str) -> Iterator[None]:
     """Hold the lock file `path`, waiting for another process that has it; it is free again when its holder dies."""
@@ -211,9 +200,25 @@ def exclusive(path: Path | str) -> Iterator[None]:
             return
 
 
+def _schema(table: Table, names: Sequence[str]) -> pa.Schema:
+    """The arrow schema for a table with these column names. Raises ValueError where they do not fit."""
+    missing = [name for name in table.columns if name not in names]
+    unknown = [name for name in names if name not in table.columns]
+    if missing:
+        raise ValueError(f"column {', '.join(missing)} is missing")
+    if unknown and not table.measures:
+        raise ValueError(f"unknown column {', '.join(unknown)}")
+    if len(set(names)) != len(names):
+        raise ValueError("a column is there twice")
+    types = {name: pa.type_for_alias(table.columns.get(name, NUMBER)) for name in names}
+    return pa.schema(
+        [pa.field(name, types[name], nullable=name in unknown or name in table.optional) for name in names]
+    )
+
+
 def _to_arrow(frame: pd.DataFrame, table: Table, path: Path) -> pa.Table:
     try:
-        schema = table.schema(list(frame.columns))
+        schema = _schema(table, list(frame.columns))
         arrow = pa.Table.from_pandas(frame, schema=schema, preserve_index=False).replace_schema_metadata(None)
         arrow.validate(full=True)
     except (ValueError, TypeError, pa.ArrowException) as error:
@@ -225,7 +230,7 @@ def _to_arrow(frame: pd.DataFrame, table: Table, path: Path) -> pa.Table:
 
 
 def _nullable(kind: pa.DataType) -> Any:
-    return pd.Int64Dtype() if kind == INTEGER else None
+    return pd.Int64Dtype() if kind == pa.type_for_alias(INTEGER) else None
 
 
 def _umask() -> int:

@@ -1,35 +1,29 @@
 """The reference run: its summaries, kept in the repository, and how another run compares with it."""
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import read_studies, read_table, write_table
+import pandas as pd
 
-TABLES = {
-    "runs.parquet": schemas.RUNS,
-    "cells.parquet": schemas.CELLS,
-    "curves.parquet": schemas.CURVES,
-    "correlation.csv": schemas.CORRELATION,
-    "correlation_published.csv": schemas.CORRELATION,
-    "claims.csv": schemas.CLAIMS,
-    "claim_parts.csv": schemas.CLAIM_PARTS,
-    "controllers.parquet": schemas.CONTROLLERS,
-    "radii.parquet": schemas.RADII,
-    "long_episodes.parquet": schemas.ALL_LONG_EPISODES,
-    "lengths.parquet": schemas.LENGTHS,
-    "comparisons.parquet": schemas.COMPARISONS,
-    "variance.parquet": schemas.VARIANCE,
-    "power.parquet": schemas.POWER,
-    "lottery.csv": schemas.LOTTERY,
-    "winners.csv": schemas.WINNERS,
-    "spread.csv": schemas.SPREAD,
-}
+from reacher_shaping.storage.block_schemas import Table
+from reacher_shaping.storage.files import read_table, write_table
+from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES
+
+_KEPT = [entry for entry in STUDY_TABLES.values() if entry.kept]
+TABLES = {entry.file: entry.schema for entry in _KEPT if entry.always}
 """The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
-OPTIONAL = {"peers.parquet": schemas.PEERS, "search/trials.csv": schemas.TRIALS}
+OPTIONAL = {entry.file: entry.schema for entry in _KEPT if not entry.always}
 """Tables that are kept with it where the run has them."""
+
+
+def read_studies(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
+    """The tables of further studies by study and name, from their files. Raises ArtifactError."""
+    found: dict[str, dict[str, pd.DataFrame]] = {}
+    for path in map(Path, paths):
+        found.setdefault(path.parent.name, {})[path.stem] = read_table(path, EXPERIMENT_TABLES[path.stem].schema)
+    return found
 
 
 def keep_tables(results: Path, kept: Path) -> None:
@@ -57,11 +51,11 @@ def keep_experiments(results: Path, kept: Path, files: Mapping[str, Sequence[str
         for file in files[name]:
             stem = Path(file).stem
             target = kept / "experiments" / name / file
-            write_table(target, found[name][stem], schemas.STUDY_TABLES[stem], sealed=False)
+            write_table(target, found[name][stem], EXPERIMENT_TABLES[stem].schema, sealed=False)
     return made
 
 
-def _keep(source: Path, target: Path, table: schemas.Table) -> None:
+def _keep(source: Path, target: Path, table: Table) -> None:
     write_table(target, read_table(source, table), table, sealed=False)
 
 

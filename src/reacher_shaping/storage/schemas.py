@@ -1,77 +1,8 @@
-"""The schema of every table of the study: its columns and their types."""
+"""The schemas of the study-wide tables: their columns and types."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
-import pyarrow as pa
-
-INTEGER, NUMBER, TEXT, FLAG = pa.int64(), pa.float64(), pa.string(), pa.bool_()
-
-
-@dataclass(frozen=True)
-class Table:
-    """Columns of a table and their types. `optional` columns may hold missing values.
-
-    With `measures`, further columns are allowed; they are numbers, missing where there is no value.
-    """
-
-    columns: Mapping[str, pa.DataType]
-    optional: frozenset[str] = frozenset()
-    measures: bool = False
-
-    def schema(self, names: Sequence[str]) -> pa.Schema:
-        """The arrow schema for a table with these column names. Raises ValueError where they do not fit."""
-        missing = [name for name in self.columns if name not in names]
-        unknown = [name for name in names if name not in self.columns]
-        if missing:
-            raise ValueError(f"column {', '.join(missing)} is missing")
-        if unknown and not self.measures:
-            raise ValueError(f"unknown column {', '.join(unknown)}")
-        if len(set(names)) != len(names):
-            raise ValueError("a column is there twice")
-        return pa.schema(
-            [
-                pa.field(name, self.columns.get(name, NUMBER), nullable=name in unknown or name in self.optional)
-                for name in names
-            ]
-        )
-
+from reacher_shaping.storage.block_schemas import FLAG, INTEGER, LENGTH, NUMBER, TEXT, Table
 
 _CELL = {"protocol": TEXT, "variant": TEXT, "budget": INTEGER, "alpha0": NUMBER}
-MEASURES = (
-    "episode_return",
-    "shaped_return",
-    "episode_length",
-    "success_rate",
-    "final_distance",
-    "action_std",
-    "entropy",
-    "approx_kl",
-    "clip_fraction",
-    "policy_loss",
-    "value_loss",
-    "explained_variance",
-    "logged_return",
-)
-"""The measures of a training iteration."""
-_EPISODE_NUMBERS = ("episode_return", "reward_distance", "reward_control", "min_distance", "final_distance")
-PROGRESS = Table(
-    {"seed": INTEGER, "iteration": INTEGER, "env_steps": INTEGER, **dict.fromkeys(MEASURES, NUMBER)},
-    optional=frozenset(MEASURES),
-)
-EPISODES = Table(
-    {
-        "seed": INTEGER,
-        "mode": TEXT,
-        "episode": INTEGER,
-        **dict.fromkeys(_EPISODE_NUMBERS, NUMBER),
-        "first_hit_step": INTEGER,
-        "success": FLAG,
-        "final_success": FLAG,
-        "share_within_radius": NUMBER,
-    },
-    optional=frozenset({"first_hit_step", *_EPISODE_NUMBERS}),
-)
 RUNS = Table({**_CELL, "seed": INTEGER, "episodes": INTEGER, "diverged": FLAG}, measures=True)
 CELLS = Table({**_CELL, "seeds": INTEGER, "diverged": INTEGER, "interval": TEXT}, measures=True)
 CORRELATION = Table(
@@ -95,9 +26,7 @@ CLAIM_PARTS = Table(
     optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
 )
 CONTROLLERS = Table({"protocol": TEXT, "controller": TEXT, "mode": TEXT, "episodes": INTEGER}, measures=True)
-_LENGTH = {"seed": INTEGER, "mode": TEXT, "steps": INTEGER, "episodes": INTEGER}
-LONG_EPISODES = Table(_LENGTH, measures=True)
-ALL_LONG_EPISODES = Table({**_CELL, **_LENGTH}, measures=True)
+ALL_LONG_EPISODES = Table({**_CELL, **LENGTH}, measures=True)
 LENGTHS = Table({**_CELL, "mode": TEXT, "steps": INTEGER, "seeds": INTEGER}, measures=True)
 RADII = Table({**_CELL, "mode": TEXT, "radius": NUMBER, "seeds": INTEGER}, measures=True)
 COMPARISONS = Table(
@@ -119,16 +48,3 @@ POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)
 LOTTERY = Table({"statement": TEXT}, measures=True)
 WINNERS = Table({"variant": TEXT, "budget": INTEGER, "alpha0": NUMBER, "share": NUMBER})
 SPREAD = Table({"quantity": TEXT}, measures=True)
-STUDY_TABLES = {
-    "runs": RUNS,
-    "cells": CELLS,
-    "curves": CURVES,
-    "logs": LOGS,
-    "logged": CURVES,
-    "comparisons": COMPARISONS,
-    "correlation": CORRELATION,
-    "controllers": CONTROLLERS,
-    "effects": EFFECTS,
-    "agreement": AGREEMENT,
-}
-"""The tables of a further study by the names of their files, see `outputs.table_files`."""

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import PPO, Cell
-from reacher_shaping.storage.schemas import MEASURES
+from reacher_shaping.storage.block_schemas import MEASURES
 from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS
 from reacher_shaping.training import advantage, ppo, shaping
 from reacher_shaping.training.policy import Policy, forward, initialise, inputs

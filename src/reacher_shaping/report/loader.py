@@ -1,0 +1,61 @@
+"""All that a report or a notebook reads: the study's tables, those of the further studies, and the published values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from reacher_shaping.report import paper_tables
+from reacher_shaping.report.text import entry
+from reacher_shaping.storage.files import read_table
+from reacher_shaping.storage.reference import read_studies
+from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study as read from its files.
+
+    `tables` are the study-wide ones by the catalogue's names, those that are there; `experiments` those of each further
+    study; `published` the paper's Tables 2 and 3 under our cell keys, `every_published` with the run that they leave
+    out; `training_logs` the summaries of the published logs.
+    """
+
+    tables: Mapping[str, pd.DataFrame]
+    experiments: Mapping[str, Mapping[str, pd.DataFrame]]
+    published: pd.DataFrame
+    every_published: pd.DataFrame
+    training_logs: pd.DataFrame
+
+
+def load(results: Path | str, published: Path | str) -> Study:
+    """Read a study from its folder (`results/`, or a reference run's) and the folder of published values.
+
+    Raises ArtifactError where a table is damaged.
+    """
+    results, published = Path(results), Path(published)
+    tables = {
+        name: read_table(results / table.file, table.schema)
+        for name, table in STUDY_TABLES.items()
+        if (results / table.file).exists()
+    }
+    files = [f"*/{table.file}" for table in EXPERIMENT_TABLES.values()]
+    paths = sorted(str(path) for file in files for path in (results / "experiments").glob(file))
+    table2, table3, left_out, logs = (
+        pd.read_csv(published / f"{name}.csv") for name in ("table2", "table3", "left_out", "training_logs")
+    )
+    return Study(
+        tables,
+        _complete(read_studies(paths)),
+        paper_tables.published_cells(table2, table3),
+        paper_tables.published_cells(table2, table3, left_out),
+        logs,
+    )
+
+
+def _complete(found: Mapping[str, Mapping[str, pd.DataFrame]]) -> dict[str, Mapping[str, pd.DataFrame]]:
+    """The further studies that have all their tables, in the order in which the words know them."""
+    needed = {name for name, table in EXPERIMENT_TABLES.items() if table.always}
+    order = [*(name for name in entry("studies") if name in found), *sorted(found.keys() - entry("studies"))]
+    return {name: found[name] for name in order if needed <= found[name].keys()}
