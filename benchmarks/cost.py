@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from reacher_shaping.settings.study import Study
-from reacher_shaping.tasks.reacher import EPISODE_STEPS
+from reacher_shaping.tasks.reacher import TASK
 
 MODES = 2  # stochastic and deterministic evaluation
 
@@ -33,7 +33,7 @@ def study(settings: Study, *, seeds: int, seeds_per_block: int, rates: Rates) ->
     episodes = MODES * settings.evaluation.episodes
     steps = [cell.iterations * cell.protocol.ppo.rollout_steps for cell in settings.cells]
     chains = [
-        2 * rates.start + size * (budget / rates.training + episodes * EPISODE_STEPS / rates.evaluation)
+        2 * rates.start + size * (budget / rates.training + episodes * TASK.episode_steps / rates.evaluation)
         for budget in steps
         for size in blocks
     ]

@@ -3,21 +3,20 @@
 import time
 from collections.abc import Callable
 
-import mujoco
 import torch
 from side_by_side import Workload
 
 from reacher_shaping.settings.cell import PPO, Cell
-from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, OBSERVATION_SIZE
+from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training.rollout import Collector, Plan
 from reacher_shaping.training.train import TrainState
 
 
 def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[torch.Tensor, torch.Tensor]]]]:
     """Return (times an iteration, operands) of all matrix products of one iteration."""
-    plan = Plan(settings.rollout_steps)
+    plan = Plan(settings.rollout_steps, TASK.episode_steps)
     hidden, batch, features, outputs = (
-        settings.hidden_units, settings.minibatch_size, OBSERVATION_SIZE + 1, ACTION_SIZE + 1,
+        settings.hidden_units, settings.minibatch_size, TASK.observation_size + 1, TASK.action_size + 1,
     )  # fmt: skip
     generator = torch.Generator().manual_seed(0)
 
@@ -44,8 +43,8 @@ def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[tor
     minibatches = settings.epochs * settings.rollout_steps // batch
     return [
         (minibatches, forward(batch) + backward),
-        (EPISODE_STEPS, forward(plan.lanes)),  # acting
-        (1, forward(plan.lanes * (EPISODE_STEPS + 1))),  # values and log-probabilities of the rollout
+        (plan.episode_steps, forward(plan.lanes)),  # acting
+        (1, forward(plan.lanes * (plan.episode_steps + 1))),  # values and log-probabilities of the rollout
         (1, forward(settings.rollout_steps)),  # the losses logged
     ]
 
@@ -56,8 +55,8 @@ class Floor:
     def __init__(self, cell: Cell, seeds: int) -> None:
         self.cell = cell
         self.seeds = range(seeds)
-        self.plan = Plan(cell.protocol.ppo.rollout_steps)
-        self.collector = Collector(self.seeds, cell.root_seed, self.plan)
+        self.plan = Plan(cell.protocol.ppo.rollout_steps, TASK.episode_steps)
+        self.collector = Collector(TASK, self.seeds, cell.root_seed, self.plan)
         self.products = [
             (times, [(a, b, torch.empty(seeds, a.shape[1], b.shape[2])) for a, b in operands])
             for times, operands in matrix_products(cell.protocol.ppo, seeds)
@@ -69,21 +68,17 @@ class Floor:
         The torques are the policy's own: an arm at its joint limit costs more, so random ones would not do.
         """
         lanes, iteration = self.collector.lanes, state.iteration
-        action = self.collector.collect(state.policy(self.cell), iteration).action.reshape(
-            lanes.count, EPISODE_STEPS, -1
-        )
+        action = self.collector.collect(state.policy(), iteration).action
+        action = action.reshape(lanes.count, self.plan.episode_steps, -1)
         lanes.reset(self.collector.resets(iteration))
-        step, model, data = mujoco.mj_step, lanes.model, lanes.data
         seconds = 0.0
-        for t in range(EPISODE_STEPS):
-            for lane, torque in zip(data, action[:, t], strict=True):
-                lane.ctrl[:] = torque
+        for t in range(self.plan.episode_steps):
+            TASK.control(lanes.data, action[:, t])
             begun = time.process_time()
-            for lane in data:
-                step(model, lane, 2)
+            lanes.batch.step(nstep=TASK.frame_skip)
             seconds += time.process_time() - begun
         # The last lane of every seed is shorter than the time measured.
-        return seconds * self.plan.steps / (self.plan.lanes * EPISODE_STEPS)
+        return seconds * self.plan.steps / (self.plan.lanes * self.plan.episode_steps)
 
     @torch.inference_mode()
     def products_seconds(self) -> float:

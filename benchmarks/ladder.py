@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from functools import partial
+from dataclasses import replace
 from unittest.mock import patch
 
 import plain_loop
@@ -10,19 +10,22 @@ import torch
 from peers import as_installed
 
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.tasks.reacher import ACTION_SIZE, Lanes
-from reacher_shaping.training import ppo, rollout
+from reacher_shaping.tasks.reacher import TASK
+from reacher_shaping.training import ppo
 from reacher_shaping.training import train as training
 from reacher_shaping.training.policy import forward, layers
 
 RADIUS = 0.02
+WHOLE = replace(TASK, simulated_model=TASK.model)
+"""Reacher with the geometries and the target that no number depends on."""
 
 
 class AutogradLearner(ppo.Learner):
     """The stack of networks as a reader would first write it: autograd, and torch's own Adam on the rows."""
 
-    def __init__(self, rows, settings, adam=None):
-        super().__init__(rows, settings, adam)
+    def __init__(self, rows, settings, shape, adam=None):
+        super().__init__(rows, settings, shape, adam)
+        self.shape = shape
         self.parameter = torch.nn.Parameter(rows)
         self.optimizer = torch.optim.Adam([self.parameter], eps=settings.adam_epsilon)
 
@@ -32,16 +35,16 @@ class AutogradLearner(ppo.Learner):
             for chosen in shuffles[:, epoch].split(self.settings.minibatch_size, dim=1):
                 self.optimizer.zero_grad()
                 minibatch = records.gather(1, chosen[..., None].expand(-1, -1, records.shape[2]))
-                self.loss(ppo.unpack(minibatch)).backward()
+                self.loss(ppo.unpack(minibatch, self.shape.actions)).backward()
                 norm = self.parameter.grad.norm(dim=1, keepdim=True)
                 self.parameter.grad.mul_((self.settings.max_gradient_norm / (norm + 1e-6)).clamp(max=1))
                 self.optimizer.step()
 
     def loss(self, samples):
         """The sum of the seeds' losses: their gradients do not meet."""
-        settings, network = self.settings, layers(self.parameter, self.settings.hidden_units)
+        settings, network = self.settings, layers(self.parameter, self.shape)
         output = forward(network, samples.features)
-        mean, value = output[:, :ACTION_SIZE], output[:, ACTION_SIZE]
+        mean, value = output[:, :-1], output[:, -1]
         deviation = (samples.action - mean) * torch.exp(-network.log_std)
         ratio = torch.exp(ppo.log_probability(deviation, network.log_std) - samples.log_prob)
         clipped = ratio.clamp(1 - settings.clip_range, 1 + settings.clip_range)
@@ -57,15 +60,15 @@ def plain(cell: Cell, seeds: Sequence[int]) -> Iterator[object]:
 
 
 def engine(
-    cell: Cell, seeds: Sequence[int], *, autograd: bool = False, contacts: bool = False
+    cell: Cell, seeds: Sequence[int], *, autograd: bool = False, whole: bool = False
 ) -> Iterator[training.TrainState]:
     """The engine, with the ideas taken out that are named."""
     with ExitStack() as parts:
         # Both are made in the first iteration; what is made stays as it is.
         if autograd:
             parts.enter_context(patch.object(ppo, "Learner", AutogradLearner))
-        if contacts:
-            parts.enter_context(patch.object(rollout, "Lanes", partial(Lanes, contacts=True)))
+        if whole:
+            parts.enter_context(patch.object(training, "load_task", lambda name: WHOLE))
         iterator = training.train(cell, seeds, radius=RADIUS)
         first = next(iterator)
     yield first
@@ -87,9 +90,9 @@ def rungs(cell: Cell, seeds: Sequence[int]) -> dict[str, tuple[int, Iterator[obj
     one = seeds[:1]
     return {
         "plain loop": (1, timed(plain(cell, one))),
-        "+ lanes": (1, timed(engine(cell, one, autograd=True, contacts=True))),
-        "+ stack of seeds": (len(seeds), timed(engine(cell, seeds, autograd=True, contacts=True))),
-        "+ written-out gradient": (len(seeds), timed(engine(cell, seeds, contacts=True))),
-        "+ contacts off": (len(seeds), timed(engine(cell, seeds))),
+        "+ lanes": (1, timed(engine(cell, one, autograd=True, whole=True))),
+        "+ stack of seeds": (len(seeds), timed(engine(cell, seeds, autograd=True, whole=True))),
+        "+ written-out gradient": (len(seeds), timed(engine(cell, seeds, whole=True))),
+        "+ lean model": (len(seeds), timed(engine(cell, seeds))),
         "+ profiling clock off": (len(seeds), engine(cell, seeds)),
     }

@@ -20,6 +20,7 @@ from scipy import stats
 
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.settings.study import load_study
+from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training.policy import Policy
 from reacher_shaping.training.train import train
 
@@ -38,7 +39,7 @@ def measures(policy, seeds, cell, study):
         mode="stochastic",
         episodes=study.evaluation.episodes,
         radius=study.evaluation.radius,
-        control_weight=cell.protocol.environment.control_weight,
+        environment=cell.protocol.environment,
         root_seed=cell.root_seed,
     ).groupby("seed")
     return {
@@ -54,7 +55,8 @@ def plain_policy(cell, seed):
         if done % 20 == 0 or done == cell.iterations:
             left = (time.monotonic() - begun) / done * (cell.iterations - done)
             print(f"plain loop, seed {seed}: iteration {done}/{cell.iterations}, {left / 60:.1f} min left", flush=True)
-    return Policy.from_weights({name: tensor.detach()[None] for name, tensor in network.state_dict().items()})
+    weights = {name: tensor.detach()[None] for name, tensor in network.state_dict().items()}
+    return Policy.from_weights(weights, TASK)
 
 
 def main():
@@ -74,7 +76,7 @@ def main():
             plain[name] += values
             print(f"plain loop, seed {seed}: {name} {values[0]:.3f}", flush=True)
     *_, state = train(cell, range(ENGINE_SEEDS), radius=study.evaluation.radius)
-    engine = measures(state.policy(cell), list(range(ENGINE_SEEDS)), cell, study)
+    engine = measures(state.policy(), list(range(ENGINE_SEEDS)), cell, study)
 
     found = {"cell": cell.name, "plain": plain, "engine": engine, "welch_p": {}}
     for name in plain:

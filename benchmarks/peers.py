@@ -11,7 +11,8 @@ from side_by_side import Workload
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, profiling_clock
+from reacher_shaping.tasks.base import profiling_clock
+from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training.policy import Policy
 
 CLOCK = profiling_clock()
@@ -85,11 +86,11 @@ def make_vec_evaluation(policy: Policy, control_weight: float, lanes: int, chunk
         for _ in range(chunks):
             observation, _ = env.reset()
             nearest, returns = np.full(lanes, np.inf), np.zeros(lanes)
-            for _ in range(EPISODE_STEPS):
-                noise = rng.standard_normal((1, lanes, ACTION_SIZE), dtype=np.float32)
+            for _ in range(TASK.episode_steps):
+                noise = rng.standard_normal((1, lanes, TASK.action_size), dtype=np.float32)
                 observation, reward, _, _, _ = env.step(policy.act(observation[None], noise)[0])
                 returns += reward
                 nearest = np.minimum(nearest, np.linalg.norm(observation[:, 8:], axis=1))
-        return chunks * lanes * EPISODE_STEPS
+        return chunks * lanes * TASK.episode_steps
 
     return episodes

@@ -38,8 +38,8 @@ from reacher_shaping.jobs import training_job
 from reacher_shaping.jobs.checkpoint import save_checkpoint
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.study import load_study
-from reacher_shaping.tasks.reacher import EPISODE_STEPS
-from reacher_shaping.training.policy import Policy, initialise
+from reacher_shaping.tasks.reacher import TASK
+from reacher_shaping.training.policy import Policy, Shape, initialise
 from reacher_shaping.training.train import TrainState
 
 TRAINED_LOG_STD = -2.2
@@ -155,10 +155,11 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
     """Evaluation against a loop over gymnasium.make_vec with the same policy."""
     cell, block = size.cell(), size.block
     weight, network = cell.protocol.environment.control_weight, cell.protocol.ppo
-    settings = {"radius": RADIUS, "control_weight": weight, "root_seed": 0, "mode": "stochastic"}
+    settings = {"radius": RADIUS, "environment": cell.protocol.environment, "root_seed": 0, "mode": "stochastic"}
+    shape = Shape.of(TASK, network)
 
     def policies(seeds: int) -> Policy:
-        stack = Policy(initialise(range(seeds), 0, network), network.hidden_units)
+        stack = Policy(initialise(range(seeds), 0, network, shape), shape)
         stack.layers.log_std.fill_(TRAINED_LOG_STD)
         return stack
 
@@ -166,7 +167,7 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
         policy = policies(seeds)
 
         def episodes() -> float:
-            return EPISODE_STEPS * len(
+            return TASK.episode_steps * len(
                 evaluate(policy.act, range(seeds), episodes=size.chunks * LANES_PER_SEED, **settings)
             )
 

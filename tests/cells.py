@@ -1,6 +1,8 @@
 """Cells for the tests of the engine, small where size does not matter."""
 
 from reacher_shaping.settings.cell import PPO, Cell, Environment, Log, Protocol, Shaping, Variant
+from reacher_shaping.tasks.reacher import TASK
+from reacher_shaping.training.policy import Policy, Shape, initialise
 
 VARIANTS = {
     "none": Variant(name="none", potential="none"),
@@ -32,3 +34,10 @@ def cell(variant="none", *, iterations=3, alpha0=1.0, root_seed=7, environment=N
 def small(variant="none", **changes):
     """Rollouts of 192 steps (three episodes and one of 42), two epochs, minibatches of 32."""
     return cell(variant, **{"rollout_steps": 192, "epochs": 2, "minibatch_size": 32, **changes})
+
+
+def fresh_policy(seeds, root_seed=0, settings=None):
+    """Networks for Reacher before their training."""
+    settings = settings or PPO()
+    shape = Shape.of(TASK, settings)
+    return Policy(initialise(seeds, root_seed, settings, shape), shape)

@@ -5,20 +5,20 @@ import pickle
 import pandas as pd
 import pytest
 import torch
+from cells import fresh_policy
 
 from reacher_shaping import cli
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Variant
 from reacher_shaping.storage.files import sha256, write_json
 from reacher_shaping.storage.policy_format import write_policy
-from reacher_shaping.training.policy import Policy, initialise
 
 COLUMNS = ["run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance"]
 
 
 @pytest.fixture(scope="module")
 def policy():
-    return Policy(initialise([5, 6], 9, PPO(hidden_units=8)), 8)
+    return fresh_policy([5, 6], 9, PPO(hidden_units=8))
 
 
 @pytest.fixture
@@ -47,7 +47,13 @@ def test_evaluate_repeats_the_studys_evaluation_of_every_run(ours, policy, capsy
     assert cli.main(["evaluate", str(ours), "--episodes", "10"]) == 0
     rows = table(capsys)
     expected = evaluate(
-        policy.act, [5, 6], mode="stochastic", episodes=10, radius=0.02, control_weight=0.25, root_seed=9
+        policy.act,
+        [5, 6],
+        mode="stochastic",
+        episodes=10,
+        radius=0.02,
+        environment=Environment(control_weight=0.25),
+        root_seed=9,
     )
     assert list(rows.columns) == COLUMNS
     assert rows["run"].unique().tolist() == [str(ours)]

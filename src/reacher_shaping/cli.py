@@ -6,8 +6,12 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from reacher_shaping import __version__
+
+if TYPE_CHECKING:
+    from reacher_shaping.settings.cell import Environment
 
 PROGRAM = "reacher-shaping"
 COLUMNS = ("run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance")
@@ -101,31 +105,29 @@ def _play(options: argparse.Namespace) -> None:
         raise ValueError(f"{options.policy}: has no run {seed}; allowed: {', '.join(map(str, trained.seeds))}")
     row = trained.seeds.index(seed)
     act = trained.policy.only(row).act
-    weight = _control_weight(options, trained.environment.control_weight)
+    environment = _environment(options, trained.environment)
     root_seed = trained.root_seed if options.seed is None else options.seed
-    clip = trained.environment.clip_actions
     if options.record is None:
         mean = viewer.play(
             act,
             episodes=options.episodes,
             mode=options.mode,
-            control_weight=weight,
+            environment=environment,
             root_seed=root_seed,
-            clip_actions=clip,
         )
-        _say(f"run {seed}: mean return {mean:.2f} at control weight {weight:g}")
+        _say(f"run {seed}: mean return {mean:.2f} at control weight {environment.control_weight:g}")
         return
     episode = video.evaluation_episode(
         act,
         seed,
         mode=options.mode,
         radius=options.radius,
-        control_weight=weight,
+        environment=environment,
         root_seed=root_seed,
-        clip_actions=clip,
     )
     name = trained.name or options.policy.parent.name or options.policy.stem
     video.write_video(options.record, video.frames(episode, f"{name}, run {seed}, episode seed {root_seed}"))
+    weight = environment.control_weight
     _say(f"{options.record}: run {seed}, return {episode.episode_return:.2f} at control weight {weight:g}")
 
 
@@ -144,12 +146,12 @@ def _evaluate(options: argparse.Namespace) -> None:
     files = [(path, load_policies(path)) for path in options.paths]  # all of them first: a wrong one costs no wait
     tables = []
     for path, trained in files:
-        weight = _control_weight(options, trained.environment.control_weight)
+        environment = _environment(options, trained.environment)
         root_seed = trained.root_seed if options.seed is None else options.seed
         source = trained.source if options.control_weight is None else "as asked for"
         _say(
             f"{path}: {len(trained.seeds)} run(s), {options.episodes} {options.mode} episodes each, "
-            f"control weight {weight:g} ({source}), seed {root_seed}"
+            f"control weight {environment.control_weight:g} ({source}), seed {root_seed}"
         )
         with np.errstate(over="ignore", invalid="ignore"):  # absurd weights give an infinite return, which says it
             episodes = evaluate(
@@ -158,9 +160,8 @@ def _evaluate(options: argparse.Namespace) -> None:
                 mode=options.mode,
                 episodes=options.episodes,
                 radius=options.radius,
-                control_weight=weight,
+                environment=environment,
                 root_seed=root_seed,
-                clip_actions=trained.environment.clip_actions,
             )
         columns = {"episode_return": "mean_return", "success": "success_rate", "final_success": "final_success_rate"}
         means = (
@@ -177,8 +178,10 @@ def _evaluate(options: argparse.Namespace) -> None:
         write_text(options.out, text)
 
 
-def _control_weight(options: argparse.Namespace, default: float) -> float:
-    return default if options.control_weight is None else float(options.control_weight)
+def _environment(options: argparse.Namespace, trained: "Environment") -> "Environment":
+    """The environment of the training, with the weight that was asked for."""
+    weight = options.control_weight
+    return trained if weight is None else trained.model_copy(update={"control_weight": float(weight)})
 
 
 def _say(line: str) -> None:

@@ -6,9 +6,10 @@ from stable_baselines3.common.monitor import Monitor
 from reacher_shaping.evaluation import controllers, episode_lengths
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.random_streams import Purpose, stream
+from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks.reacher import draw_reset
 
-SETTINGS = {"radius": 0.02, "control_weight": 1.0, "root_seed": 3}
+SETTINGS = {"radius": 0.02, "environment": Environment(control_weight=1.0), "root_seed": 3}
 
 
 def targets(count):
@@ -47,7 +48,7 @@ def test_unreachable_target_is_approached_as_far_as_the_arm_allows(distance):
 
 @pytest.mark.parametrize("weight", [0.1, 1.0])
 def test_reach_succeeds_always_and_beats_doing_nothing(weight):
-    settings = SETTINGS | {"control_weight": weight, "mode": "deterministic", "episodes": 40}
+    settings = SETTINGS | {"environment": Environment(control_weight=weight), "mode": "deterministic", "episodes": 40}
     frame = evaluate(controllers.reach(controllers.TUNED_GAINS[weight]), [0], **settings)
     idle = evaluate(controllers.zero, [0], **settings)
     assert frame["final_success"].all()
@@ -56,7 +57,11 @@ def test_reach_succeeds_always_and_beats_doing_nothing(weight):
 
 def test_gains_are_at_a_local_optimum_for_their_control_weight():
     def mean_return(weight, gains):
-        settings = SETTINGS | {"control_weight": weight, "mode": "deterministic", "episodes": 40}
+        settings = SETTINGS | {
+            "environment": Environment(control_weight=weight),
+            "mode": "deterministic",
+            "episodes": 40,
+        }
         return evaluate(controllers.reach(gains), [0], **settings)["episode_return"].mean()
 
     heavy, light = controllers.TUNED_GAINS[1.0], controllers.TUNED_GAINS[0.1]
@@ -71,7 +76,7 @@ def test_evaluation_of_a_controller_equals_stepping_gymnasium_under_monitor():
     resets, noise = stream(3, Purpose.EVALUATION_RESETS), stream(3, Purpose.EVALUATION_ACTIONS)
     for row in frame.itertuples():
         environment.reset(seed=0)
-        environment.unwrapped.set_state(*draw_reset(resets))
+        environment.unwrapped.set_state(*np.split(draw_reset(resets), 2))
         truncated = False
         while not truncated:
             observation, _, _, truncated, info = environment.step(noise.standard_normal(2, dtype=np.float32))

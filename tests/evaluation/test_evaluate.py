@@ -4,22 +4,23 @@ import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
+from cells import fresh_policy
 from stable_baselines3.common.monitor import Monitor
 
 from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.settings.cell import PPO
-from reacher_shaping.training.policy import Policy, initialise, layers
+from reacher_shaping.settings.cell import Environment
+from reacher_shaping.training.policy import Policy
 
 ROOT, WEIGHT, RADIUS = 5, 0.1, 0.05
-SETTINGS = {"radius": RADIUS, "control_weight": WEIGHT, "root_seed": ROOT}
+SETTINGS = {"radius": RADIUS, "environment": Environment(control_weight=WEIGHT), "root_seed": ROOT}
 
 
 @pytest.fixture(scope="module")
 def policy():
-    rows = initialise([0, 1], 3, PPO(hidden_units=64))
-    layers(rows, 64).log_std.fill_(-0.5)
-    return Policy(rows, 64)
+    policy = fresh_policy([0, 1], 3)
+    policy.layers.log_std.fill_(-0.5)
+    return policy
 
 
 def monitored(policy, row, mode, episodes, *, clip=False):
@@ -27,7 +28,7 @@ def monitored(policy, row, mode, episodes, *, clip=False):
     env = Monitor(gymnasium.make("Reacher-v5", reward_control_weight=WEIGHT))
     resets, draws = stream(ROOT, Purpose.EVALUATION_RESETS), stream(ROOT, Purpose.EVALUATION_ACTIONS)
     env.unwrapped.np_random = resets
-    alone = Policy(policy.rows[row : row + 1].clone(), policy.hidden)
+    alone = Policy(policy.rows[row : row + 1].clone(), policy.shape)
     rows = []
     for _ in range(episodes):
         noise = draws.standard_normal((50, 2), dtype=np.float32)
@@ -63,7 +64,9 @@ def monitored(policy, row, mode, episodes, *, clip=False):
 @pytest.mark.parametrize("clip", [False, True], ids=["raw", "clipped"])
 def test_episodes_are_those_of_gymnasium_under_monitor(policy, mode, clip):
     """Monitor rounds returns to six digits; actions of one lane and of fifty differ in the last digit of float32."""
-    ours = evaluate(policy.act, [10, 11], mode=mode, episodes=25, clip_actions=clip, **SETTINGS)
+    environment = Environment(control_weight=WEIGHT, clip_actions=clip)
+    settings = SETTINGS | {"environment": environment}
+    ours = evaluate(policy.act, [10, 11], mode=mode, episodes=25, **settings)
     assert ours["seed"].tolist() == [10] * 25 + [11] * 25
     assert ours["episode"].tolist() == [*range(25)] * 2
     assert set(ours["mode"]) == {mode}
@@ -92,7 +95,7 @@ def test_fewer_episodes_are_the_first_of_more(policy):
 def test_a_policys_episodes_do_not_depend_on_the_block(policy):
     both = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
     for row in (0, 1):
-        single = Policy(policy.rows[row : row + 1].clone(), 64)
+        single = Policy(policy.rows[row : row + 1].clone(), policy.shape)
         alone = evaluate(single.act, [row], mode="stochastic", episodes=20, **SETTINGS)
         pd.testing.assert_frame_equal(alone, both[both["seed"] == row].reset_index(drop=True), check_exact=True)
 
@@ -123,7 +126,8 @@ def test_radius_and_weight_change_only_what_they_should(policy):
     wide = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS | {"radius": 10.0})
     assert wide["success"].all()
     assert (wide["first_hit_step"] == 1).all()
-    dear = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS | {"control_weight": 1.0})
+    settings = SETTINGS | {"environment": Environment(control_weight=1.0)}
+    dear = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **settings)
     np.testing.assert_allclose(dear["reward_control"], 10 * base["reward_control"], rtol=1e-6)
     for name in ("reward_distance", "min_distance", "final_distance"):
         assert base[name].equals(wide[name])
@@ -147,7 +151,7 @@ def test_a_policy_of_nans_gives_rows_and_leaves_the_others_alone(policy):
     clean = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
     rows = policy.rows.clone()
     rows[0] = np.nan
-    found = evaluate(Policy(rows, 64).act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
+    found = evaluate(Policy(rows, policy.shape).act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
     second = [frame[frame["seed"] == 1] for frame in (found, clean)]
     pd.testing.assert_frame_equal(*second, check_exact=True)
     assert found[found["seed"] == 0]["episode_return"].isna().all()

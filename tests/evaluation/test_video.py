@@ -6,9 +6,10 @@ from PIL import Image
 from reacher_shaping.evaluation import video
 from reacher_shaping.evaluation.controllers import TUNED_GAINS, reach
 from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks import rendering
 
-SETTINGS = {"mode": "deterministic", "radius": 0.02, "control_weight": 1.0, "root_seed": 0, "clip_actions": False}
+SETTINGS = {"mode": "deterministic", "radius": 0.02, "environment": Environment(control_weight=1.0), "root_seed": 0}
 
 
 @pytest.fixture(scope="module")

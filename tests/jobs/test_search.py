@@ -127,7 +127,7 @@ def test_score_is_the_mean_over_what_the_evaluation_found(monkeypatch):
     cell = SPEC.cell(protocol, L2, {}).model_copy(update={"budget": 192})
     found = search.score(cell, 3, episodes=7, radius=0.03)
     assert found == {name: 2.0 * place for place, name in enumerate(search.MEASURES)}
-    expected = {"mode": "stochastic", "clip_actions": True, "control_weight": 0.5, "episodes": 7, "radius": 0.03}
+    expected = {"mode": "stochastic", "environment": protocol.environment, "episodes": 7, "radius": 0.03}
     assert asked == expected | {"seeds": [0, 1, 2], "root_seed": 5}
 
 

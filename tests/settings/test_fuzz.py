@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import torch
 import yaml
-from cells import small
+from cells import fresh_policy, small
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -18,12 +18,10 @@ from reacher_shaping.evaluation.policies import load_policies
 from reacher_shaping.jobs import training_job
 from reacher_shaping.jobs.checkpoint import save_checkpoint
 from reacher_shaping.settings.base import ConfigError
-from reacher_shaping.settings.cell import PPO
 from reacher_shaping.settings.study import Study, load_study
 from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import ArtifactError, read_table, write_table
 from reacher_shaping.storage.policy_format import write_policy
-from reacher_shaping.training.policy import Policy, initialise
 from reacher_shaping.training.train import train
 
 DEFAULT = yaml.safe_load((Path(__file__).parents[2] / "config.yaml").read_text())
@@ -147,7 +145,7 @@ def stored(tmp_path_factory) -> Path:
     cell = small("l2", iterations=2)
     *_, state = train(cell, [0, 1], radius=0.02)
     save_checkpoint(folder / "checkpoint.pt", state)
-    policy = Policy(initialise([0, 1], 0, PPO(hidden_units=64)), 64)
+    policy = fresh_policy([0, 1])
     write_policy(folder / "policy.pt", [0, 1], policy.weights(), {"cell": cell.settings()})
     write_table(folder / "progress.parquet", state.progress_frame(), block_schemas.PROGRESS)
     return folder
@@ -206,7 +204,7 @@ def test_damaged_table_is_refused_or_read_as_it_was(stored, damage):
 )
 def test_made_up_policy_is_refused(content, whole):
     """Valid torch files whose dict holds anything; with `whole`, the rest of it is as it should be."""
-    policy = Policy(initialise([0], 0, PPO(hidden_units=64)), 64)
+    policy = fresh_policy([0])
     base = {"format": 1, "seeds": [0], "weights": policy.weights(), "settings": json.dumps({"cell": {}})}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.pt"

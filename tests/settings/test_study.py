@@ -182,7 +182,6 @@ def test_a_label_may_be_given_to_the_baseline():
         ("experiments.standard.peers.budgets", {"ppo": 4096}, ["peers.budgets.ppo = 4096", "500000, 1000000"]),
         ("protocols.standard.ppo.networks", "shared", ["Stable-Baselines3's PPO has networks = 'separate'"]),
         ("protocols.standard.ppo.minibatch_size", 1, ["minibatch_size = 1", ">= 2"]),
-        ("protocols.released.ppo", {"rollout_steps": 32, "minibatch_size": 32}, ["rollout_steps = 32", ">= 50"]),
         ("experiments.search", {"seeds": 1, "grid": []}, ["experiments", "grid is missing"]),
         ("search.fixed", {"ppo.nonsense": 1}, ["search: 'ppo.nonsense' is no setting"]),
         ("search.fixed", {"ppo.learning_rate_schedule": "cosine"}, ["learning_rate_schedule = 'cosine'", "'linear'"]),

@@ -221,7 +221,7 @@ def test_stable_baselines3_reads_our_monitors(tmp_path):
     rows = pd.DataFrame(
         {"seed": [7, 7, 8], "episode_return": [-1.25, -2.5, -3.0], "episode_length": 50, "env_steps": [50, 100, 50]}
     )
-    write_monitors(tmp_path, rows)
+    write_monitors(tmp_path, rows, "Reacher-v5", 0.02)
     results = load_results(str(tmp_path))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["7.monitor.csv", "8.monitor.csv"]
     assert sorted(results["r"]) == [-3.0, -2.5, -1.25]

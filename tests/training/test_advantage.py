@@ -35,7 +35,7 @@ def sequential_gae(reward, value, last_value, ends, *, bootstrap):
 @pytest.mark.parametrize("episode_end", ["terminal", "bootstrap"])
 @pytest.mark.parametrize("steps", [2048, 100, 148, 7])
 def test_advantages_and_returns_are_those_of_stable_baselines3(episode_end, steps):
-    plan = Plan(steps)
+    plan = Plan(steps, 50)
     rng = np.random.default_rng(0)
     reward = rng.normal(-0.2, 1, (2, plan.lanes, 50))
     values = rng.normal(size=(2, plan.lanes, 51))
@@ -76,7 +76,7 @@ def test_lambda_zero_is_the_one_step_error_and_lambda_one_the_discounted_return(
 @pytest.mark.parametrize("episode_end", ["terminal", "bootstrap"])
 def test_nothing_after_a_lanes_end_reaches_back(episode_end):
     """The lane of 48 steps: whatever stands in its two unused steps, even NaN, changes nothing before."""
-    plan = Plan(2048)
+    plan = Plan(2048, 50)
     assert plan.lengths.tolist() == [50] * 40 + [48]
     rng = np.random.default_rng(1)
     reward, values = rng.normal(size=(1, 41, 50)), rng.normal(size=(1, 41, 51))

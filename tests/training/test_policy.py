@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 import stable_baselines3
 import torch
+from cells import fresh_policy
 from plain_loop import Network
 
 from reacher_shaping.settings.cell import PPO
-from reacher_shaping.training.policy import ALIGNMENT, Policy, forward, initialise, inputs, parameter_count
+from reacher_shaping.tasks.reacher import TASK
+from reacher_shaping.training.policy import ALIGNMENT, Policy, forward, inputs, parameter_count
 
 SEEDS = [0, 1, 5]
 
 
 @pytest.fixture
 def policy():
-    rows = initialise(SEEDS, 3, PPO(hidden_units=64))
-    policy = Policy(rows, 64)
+    policy = fresh_policy(SEEDS, 3)
     policy.layers.log_std.uniform_(-1, 0, generator=torch.Generator().manual_seed(0))
     return policy
 
@@ -26,7 +27,7 @@ def policy():
 def networks(policy):
     weights = policy.weights()
     for seed in range(len(policy)):
-        network = Network(policy.hidden)
+        network = Network(policy.shape.hidden)
         network.load_state_dict({name: tensor[seed] for name, tensor in weights.items()})
         yield network
 
@@ -54,12 +55,12 @@ def test_actions_of_a_seed_do_not_depend_on_the_others(policy, lanes):
     observation, noise = rng.normal(size=(3, lanes, 10)), rng.standard_normal((3, lanes, 2), dtype=np.float32)
     together = policy.act(observation, noise)
     for seed in range(3):
-        alone = Policy(policy.rows[seed : seed + 1].clone(), 64)
+        alone = Policy(policy.rows[seed : seed + 1].clone(), policy.shape)
         np.testing.assert_array_equal(alone.act(observation[[seed]], noise[[seed]])[0], together[seed])
 
 
 def test_initial_weights_are_uniform_in_the_range_of_torch_linear_and_log_std_is_zero():
-    weights = Policy(initialise(range(20), 0, PPO(hidden_units=64)), 64).weights()
+    weights = fresh_policy(range(20)).weights()
     for name, tensor in weights.items():
         if name == "log_std":
             assert not tensor.any()
@@ -78,9 +79,9 @@ def test_initial_weights_are_uniform_in_the_range_of_torch_linear_and_log_std_is
 
 
 def test_initial_weights_depend_on_seed_and_root_alone():
-    rows = initialise(SEEDS, 3, PPO(hidden_units=64))
-    assert torch.equal(initialise([5, 0], 3, PPO(hidden_units=64)), rows[[2, 0]])
-    assert not torch.equal(initialise([5], 4, PPO(hidden_units=64))[0], rows[2])
+    rows = fresh_policy(SEEDS, 3).rows
+    assert torch.equal(fresh_policy([5, 0], 3).rows, rows[[2, 0]])
+    assert not torch.equal(fresh_policy([5], 4).rows[0], rows[2])
     assert not torch.equal(rows[0], rows[1])
 
 
@@ -88,19 +89,18 @@ def test_initial_weights_depend_on_seed_and_root_alone():
 @pytest.mark.parametrize("hidden", [64, 7])
 def test_weights_round_trip_bit_for_bit(hidden, networks):
     settings = PPO(hidden_units=hidden, networks=networks, initial_log_std=-0.25)
-    rows = initialise(SEEDS, 3, settings)
-    policy = Policy(rows, hidden, settings.towers)
+    policy = fresh_policy(SEEDS, 3, settings)
     assert torch.equal(policy.layers.log_std, torch.full((len(SEEDS), 2, 1), -0.25))
-    copy = Policy.from_weights(policy.weights())
-    assert torch.equal(copy.rows, rows)
-    assert (copy.hidden, copy.towers) == (hidden, settings.towers)
-    assert rows.shape[1] == parameter_count(hidden, settings.towers)
-    assert parameter_count(hidden, settings.towers) % ALIGNMENT == 0
+    copy = Policy.from_weights(policy.weights(), TASK)
+    assert torch.equal(copy.rows, policy.rows)
+    assert copy.shape == policy.shape == (10, 2, hidden, settings.towers)
+    assert policy.rows.shape[1] == parameter_count(policy.shape)
+    assert parameter_count(policy.shape) % ALIGNMENT == 0
 
 
 def test_a_network_of_two_trunks_is_that_of_torch():
     settings = PPO(hidden_units=16, networks="separate", initial_log_std=-0.5)
-    policy = Policy(initialise(SEEDS, 3, settings), 16, 2)
+    policy = fresh_policy(SEEDS, 3, settings)
     observation = np.random.default_rng(3).normal(size=(3, 9, 10))
     outputs = forward(policy.layers, inputs(observation))
     for seed in range(3):
@@ -120,7 +120,7 @@ def test_orthogonal_weights_are_orthogonal_with_stable_baselines3s_gains():
         "policy_mean": model.action_net, "value": model.value_net,
     }  # fmt: skip
     settings = PPO(networks="separate", initialisation="orthogonal")
-    weights = Policy(initialise([1], 3, settings), 64, 2).weights()
+    weights = fresh_policy([1], 3, settings).weights()
     for name, layer in theirs.items():
         ours, expected = weights[f"{name}.weight"][0], layer.weight.detach()
         for matrix in (ours, expected):  # of the smaller side's size: the gain squared times the identity
@@ -140,7 +140,7 @@ def test_weights_are_copies(policy):
 
 def test_a_state_dict_in_the_layout_of_the_release_becomes_a_policy_of_one_seed():
     network = Network(32)
-    policy = Policy.from_weights({name: tensor.detach()[None] for name, tensor in network.state_dict().items()})
+    policy = Policy.from_weights({name: tensor.detach()[None] for name, tensor in network.state_dict().items()}, TASK)
     observation = np.random.default_rng(2).normal(size=(1, 6, 10))
     expected = network(torch.from_numpy(observation[0]).float())[0].mean.detach().numpy()
     np.testing.assert_allclose(policy.act(observation, None)[0], expected, atol=1e-6)
@@ -165,7 +165,7 @@ def test_foreign_weights_are_refused_naming_the_tensor(policy, spoil, message):
     weights = policy.weights()
     spoil(weights)
     with pytest.raises(ValueError, match=message):
-        Policy.from_weights(weights)
+        Policy.from_weights(weights, TASK)
 
 
 def test_padding_of_the_rows_is_never_read(policy):

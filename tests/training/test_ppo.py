@@ -15,17 +15,18 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from reacher_shaping.settings.cell import PPO
+from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training import ppo
-from reacher_shaping.training.policy import Policy, initialise, parameter_count
+from reacher_shaping.training.policy import Policy, Shape, initialise, parameter_count
 
 HIDDEN = 8
 
 
 def network_of(rows, seed, hidden):
     """One seed of a stack as a torch.nn.Module of the same precision."""
-    towers = rows.shape[1] // parameter_count(hidden)
-    network = Network(hidden, separate=towers == 2).to(rows.dtype)
-    network.load_state_dict({name: tensor[seed] for name, tensor in Policy(rows, hidden, towers).weights().items()})
+    towers = rows.shape[1] // parameter_count(Shape(10, 2, hidden))
+    network, policy = Network(hidden, separate=towers == 2).to(rows.dtype), Policy(rows, Shape(10, 2, hidden, towers))
+    network.load_state_dict({name: tensor[seed] for name, tensor in policy.weights().items()})
     return network
 
 
@@ -37,8 +38,9 @@ def random_problem(key, *, seeds=3, count=64, hidden=HIDDEN, dtype=torch.float64
         return torch.randn(*shape, generator=generator, dtype=torch.float64)
 
     options = PPO(hidden_units=hidden, networks=networks)
-    rows = initialise(range(seeds), key, options).double()
-    policy = Policy(rows, hidden, options.towers)
+    shape = Shape(10, 2, hidden, options.towers)
+    rows = initialise(range(seeds), key, options, shape).double()
+    policy = Policy(rows, shape)
     policy.layers.log_std[:] = 0.5 * normal(seeds, 2, 1) - 0.5
     features = torch.cat([normal(seeds, count, 10), torch.ones(seeds, count, 1, dtype=torch.float64)], dim=-1)
     action, log_prob = normal(seeds, count, 2), torch.empty(seeds, count, dtype=torch.float64)
@@ -76,11 +78,11 @@ def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, va
         networks=networks,
     )
     rows, records = random_problem(key, spread=spread, networks=networks)
-    samples = ppo.unpack(records)
-    learner = ppo.Learner(rows, options)
+    samples = ppo.unpack(records, 2)
+    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.differentiate(samples)
-    ours = Policy(learner.gradient, HIDDEN, options.towers).weights()
-    owned = Policy.from_weights(ours).rows  # what the weights do not name is zero in it
+    ours = Policy(learner.gradient, Shape.of(TASK, options)).weights()
+    owned = Policy.from_weights(ours, TASK).rows  # what the weights do not name is zero in it
     assert torch.equal(learner.gradient.float(), owned)
     for seed in range(len(rows)):
         network = network_of(rows, seed, HIDDEN)
@@ -137,10 +139,10 @@ def stable_ppo(samples, seed, network, options):
 def test_gradient_agrees_with_stable_baselines3s_ppo_on_the_same_minibatch():
     options = PPO()
     rows, records = random_problem(11, hidden=64, seeds=2, dtype=torch.float32)
-    samples = ppo.unpack(records)
-    learner = ppo.Learner(rows, options)
+    samples = ppo.unpack(records, 2)
+    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.differentiate(samples)
-    ours = Policy(learner.gradient, 64).weights()
+    ours = Policy(learner.gradient, Shape.of(TASK, options)).weights()
     for seed in range(2):
         network = network_of(rows, seed, 64)
         model = stable_ppo(samples, seed, network, options)
@@ -196,12 +198,12 @@ def test_adam_is_torchs():
 def test_gradients_are_clipped_per_seed_as_torch_clips_one_network(scale):
     options = PPO(hidden_units=HIDDEN)
     rows, records = random_problem(2)
-    learner = ppo.Learner(rows, options)
-    learner.differentiate(ppo.unpack(records))
+    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    learner.differentiate(ppo.unpack(records, 2))
     learner.gradient *= scale * torch.tensor([[1.0], [10.0], [100.0]])
-    before = Policy(learner.gradient.clone(), HIDDEN).weights()
+    before = Policy(learner.gradient.clone(), Shape.of(TASK, options)).weights()
     learner._clip()
-    after = Policy(learner.gradient, HIDDEN).weights()
+    after = Policy(learner.gradient, Shape.of(TASK, options)).weights()
     for seed in range(3):
         network = Network(HIDDEN).double()
         for name, parameter in network.named_parameters():
@@ -219,13 +221,13 @@ def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_ord
          for s in range(3)]
     )  # fmt: skip
     networks = [network_of(rows, seed, HIDDEN) for seed in range(3)]
-    learner = ppo.Learner(rows, options)
+    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
     assert learner.adam.steps == 9
-    ours = Policy(rows, HIDDEN).weights()
+    ours = Policy(rows, Shape.of(TASK, options)).weights()
     for seed, network in enumerate(networks):
         optimizer = torch.optim.Adam(network.parameters(), lr=0.01, eps=options.adam_epsilon)
-        fields = minibatch(ppo.unpack(records), seed)
+        fields = minibatch(ppo.unpack(records, 2), seed)
         for epoch in range(3):
             for chosen in shuffles[seed, epoch].split(32):
                 optimizer.zero_grad()
@@ -241,11 +243,11 @@ def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
     options = PPO()
     rows, records = random_problem(4, hidden=64, count=128, dtype=torch.float32)
     shuffles = torch.stack([torch.randperm(128).expand(2, 128) for _ in range(3)])
-    clean = ppo.Learner(rows.clone(), options)
+    clean = ppo.Learner(rows.clone(), options, Shape.of(TASK, options))
     clean.update(records, shuffles, options.learning_rate)
     rows, records = rows.clone(), records.clone()
     (rows if poison == "weights" else records)[1] = math.nan
-    learner = ppo.Learner(rows, options)
+    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
     assert torch.equal(learner.rows[[0, 2]], clean.rows[[0, 2]])
     assert not torch.isfinite(learner.rows[1]).any()
@@ -254,7 +256,7 @@ def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
 def test_padding_of_the_rows_stays_zero():
     options = PPO()
     rows, records = random_problem(5, hidden=64, dtype=torch.float32)
-    learner = ppo.Learner(rows, options)
+    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.update(records, torch.arange(64).expand(3, 5, 64), options.learning_rate)
     used = sum(math.prod(layer.shape[1:]) for layer in learner.network)
     assert used < rows.shape[1]
@@ -264,8 +266,8 @@ def test_padding_of_the_rows_stays_zero():
 def test_diagnostics_are_those_stable_baselines3_logs():
     options = PPO()
     rows, records = random_problem(6, hidden=64, seeds=2, dtype=torch.float32)
-    samples = ppo.unpack(records)
-    found = ppo.diagnose(Policy(rows, 64).layers, records, options.clip_range)
+    samples = ppo.unpack(records, 2)
+    found = ppo.diagnose(Policy(rows, Shape.of(TASK, options)).layers, records, options.clip_range)
     for seed in range(2):
         model = stable_ppo(samples, seed, network_of(rows, seed, 64), options)
         model.train()
@@ -283,7 +285,7 @@ def test_diagnostics_are_those_stable_baselines3_logs():
 
 def test_records_keep_every_field():
     fields = (torch.randn(2, 5, 11), torch.randn(2, 5, 2), *(torch.randn(2, 5) for _ in range(3)))
-    samples = ppo.unpack(ppo.pack(*fields))
+    samples = ppo.unpack(ppo.pack(*fields), 2)
     assert torch.equal(samples.action, fields[1].transpose(1, 2))
     for ours, given_ in zip((samples.features, *samples[2:]), (fields[0], *fields[2:]), strict=True):
         np.testing.assert_array_equal(ours, given_)

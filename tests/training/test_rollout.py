@@ -3,30 +3,30 @@
 import numpy as np
 import plain_loop
 import pytest
-from cells import cell, small
+from cells import cell, fresh_policy, small
 
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.training.policy import Policy, initialise
-from reacher_shaping.training.rollout import Collector, Plan, environment_reward
+from reacher_shaping.tasks.reacher import TASK, dense
+from reacher_shaping.training.rollout import Collector, Plan
 
 CELL = cell("l2")
-PLAN = Plan(2048)
+PLAN = Plan(2048, 50)
 
 
 def policy_of(seeds, of=CELL):
-    return Policy(initialise(seeds, of.root_seed, of.protocol.ppo), of.protocol.ppo.hidden_units)
+    return fresh_policy(seeds, of.root_seed, of.protocol.ppo)
 
 
 @pytest.fixture(scope="module")
 def rollout():
     """Iteration 5 of seeds 0, 3."""
-    return Collector([0, 3], CELL.root_seed, PLAN).collect(policy_of([0, 3]), 5)
+    return Collector(TASK, [0, 3], CELL.root_seed, PLAN).collect(policy_of([0, 3]), 5)
 
 
 def test_stepping_gymnasium_with_the_same_actions_gives_the_same_bits(rollout):
     """All 2048 steps in their sequential order, the 48-step lane and the state reached at its end included."""
     env = plain_loop.make_environment(CELL)
-    rewards = environment_reward(rollout.distance, rollout.control, 0.1)
+    rewards = dense(rollout.measured[..., 1:, :], rollout.control, control_weight=0.1, success_radius=0.0)
     for row, seed in enumerate([0, 3]):
         env.unwrapped.np_random = stream(CELL.root_seed, Purpose.RESETS, seed, 5)
         steps = 0
@@ -53,7 +53,7 @@ def test_rollout_equals_the_plain_loop(rollout):
     network = plain_loop.Network()
     network.load_state_dict({name: tensor[1] for name, tensor in policy_of([0, 3]).weights().items()})
     plain = plain_loop.collect(plain_loop.make_environment(CELL), network, CELL, 3, 5)
-    reward = environment_reward(rollout.distance, rollout.control, 0.1)
+    reward = dense(rollout.measured[..., 1:, :], rollout.control, control_weight=0.1, success_radius=0.0)
     sequence = {
         "observation": rollout.observation[:, :, :-1],
         "action": rollout.action,
@@ -82,14 +82,14 @@ def test_noise_is_indexed_by_episode_and_step(rollout):
 
 @pytest.mark.parametrize("block", [[3], [9, 3, 4], [*range(10)]], ids=len)
 def test_a_seeds_rollout_is_the_same_in_every_block(rollout, block):
-    ours = Collector(block, CELL.root_seed, PLAN).collect(policy_of(block), 5)
+    ours = Collector(TASK, block, CELL.root_seed, PLAN).collect(policy_of(block), 5)
     row = block.index(3)
     for name in ("observation", "distance", "action", "control"):
         np.testing.assert_array_equal(getattr(ours, name)[row], getattr(rollout, name)[1], err_msg=name)
 
 
 def test_a_collector_keeps_nothing_from_one_rollout_to_the_next(rollout):
-    collector = Collector([3], CELL.root_seed, PLAN)
+    collector = Collector(TASK, [3], CELL.root_seed, PLAN)
     for iteration in (0, 5):
         ours = collector.collect(policy_of([3]), iteration)
     np.testing.assert_array_equal(ours.observation, rollout.observation[1:])
@@ -98,8 +98,8 @@ def test_a_collector_keeps_nothing_from_one_rollout_to_the_next(rollout):
 
 
 def test_a_shorter_rollout_is_the_start_of_a_longer_one(rollout):
-    plan = Plan(192)
-    ours = Collector([3], CELL.root_seed, plan).collect(policy_of([3]), 5)
+    plan = Plan(192, 50)
+    ours = Collector(TASK, [3], CELL.root_seed, plan).collect(policy_of([3]), 5)
     for name in ("observation", "action"):
         expected = PLAN.sequence(getattr(rollout, name)[:, :, :50])[1, :192]
         np.testing.assert_allclose(plan.sequence(getattr(ours, name)[:, :, :50])[0], expected, atol=1e-3)
@@ -108,7 +108,7 @@ def test_a_shorter_rollout_is_the_start_of_a_longer_one(rollout):
 def test_clipped_actions_are_stepped_and_charged_and_the_loss_sees_the_sample():
     of = small()
     raw, clipped = (
-        Collector([1], of.root_seed, Plan(192), clip_actions=clip).collect(policy_of([1], of), 0)
+        Collector(TASK, [1], of.root_seed, Plan(192, 50), clip_actions=clip).collect(policy_of([1], of), 0)
         for clip in (False, True)
     )
     first = raw.action[:, :, 0]
@@ -122,7 +122,7 @@ def test_clipped_actions_are_stepped_and_charged_and_the_loss_sees_the_sample():
 
 @pytest.mark.parametrize(("steps", "lengths"), [(2048, [50] * 40 + [48]), (100, [50, 50]), (7, [7]), (51, [50, 1])])
 def test_plan_lays_the_steps_out_in_lanes(steps, lengths):
-    plan = Plan(steps)
+    plan = Plan(steps, 50)
     assert plan.lengths.tolist() == lengths
     assert plan.lanes == len(lengths)
     assert plan.episodes == lengths.count(50)

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from reacher_shaping.settings.cell import Shaping, Variant
-from reacher_shaping.training.shaping import alpha, potential, shaping_reward
+from reacher_shaping.settings.cell import PPO, Cell, Protocol, Shaping, Variant
+from reacher_shaping.training.shaping import Rule
 
 STEPS = 50
 DISTANCES = arrays(np.float64, STEPS + 1, elements=st.floats(0, 0.5))
@@ -17,19 +17,21 @@ DISCOUNTS = st.floats(0.5, 1)
 POTENTIALS = st.sampled_from(["l2", "l2sq"])
 
 
+def rule(variant, *, alpha0=1.0, discount=0.99, **settings):
+    protocol = Protocol(name="p", ppo=PPO(discount=discount), shaping=Shaping(**settings))
+    return Rule.of(Cell(protocol=protocol, variant=variant, budget=2048, alpha0=alpha0))
+
+
+def alpha(variant, alpha0, env_steps):
+    return rule(variant, alpha0=alpha0).alpha({}, env_steps)
+
+
 def shaping_terms(distance, variant, *, alpha0=1.0, discount=0.99, start=0, **settings):
     """F [T] of one lane of T steps."""
     steps = len(distance) - 1
     ends = (np.arange(steps) == steps - 1)[None]
-    return shaping_reward(
-        np.asarray(distance)[None, None],
-        (start + np.arange(steps))[None],
-        ends,
-        variant=variant,
-        alpha0=alpha0,
-        discount=discount,
-        settings=Shaping(**settings),
-    )[0, 0]
+    shaping = rule(variant, alpha0=alpha0, discount=discount, **settings)
+    return shaping.reward(np.asarray(distance)[None, None], (start + np.arange(steps))[None], ends, {})[0, 0]
 
 
 def discounted_sum(terms, discount):
@@ -109,15 +111,8 @@ def test_only_a_lanes_own_last_step_is_an_end():
     """Two lanes, the second cut after two of three steps."""
     distance = np.array([[[0.4, 0.3, 0.2, 0.1], [0.4, 0.3, 0.2, 9.0]]])
     ends = np.array([[False, False, True], [False, True, False]])
-    terms = shaping_reward(
-        distance,
-        np.arange(6).reshape(2, 3),
-        ends,
-        variant=VARIANTS["l2"],
-        alpha0=1.0,
-        discount=1.0,
-        settings=Shaping(terminal_potential="zero"),
-    )
+    shaping = rule(VARIANTS["l2"], discount=1.0, terminal_potential="zero")
+    terms = shaping.reward(distance, np.arange(6).reshape(2, 3), ends, {})
     np.testing.assert_allclose(terms[0, 0], [0.1, 0.1, 0.2])
     np.testing.assert_allclose(terms[0, 1, :2], [0.1, 0.3])
 
@@ -139,8 +134,3 @@ def test_linear_schedule_starts_at_alpha0_halves_halfway_and_ends_at_zero_for_go
 @given(ALPHAS)
 def test_constant_schedule_is_alpha0_for_ever(alpha0):
     assert alpha(VARIANTS["l2"], alpha0, [0, 1, 10**9]).tolist() == [alpha0] * 3
-
-
-def test_an_unknown_potential_is_refused_with_the_allowed_names():
-    with pytest.raises(ValueError, match=r"'l3'.*'none', 'l2', 'l2sq'"):
-        potential("l3", 1.0)

@@ -30,7 +30,7 @@ def moved(network, of, seed):
 
 
 def weight_error(state, of, seed, network):
-    weights = state.policy(of).weights()
+    weights = state.policy().weights()
     row = state.seeds.index(seed)
     return max((weights[name][row] - tensor).abs().max().item() for name, tensor in network.state_dict().items())
 

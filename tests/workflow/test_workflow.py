@@ -136,6 +136,7 @@ def test_tables_have_the_columns_of_the_contract(project):
         *["final_distance", "action_std", "entropy", "approx_kl", "clip_fraction", "policy_loss", "value_loss"],
         "explained_variance",
         "logged_return",
+        "alpha",
     ]
     assert progress[["seed", "iteration", "env_steps"]].to_numpy().tolist() == [[1, 1, 2048]]
     episodes = pd.read_parquet(block / "episodes.parquet")

@@ -3,6 +3,7 @@ import json
 import os
 import re
 import sys
+from functools import cache
 
 from reacher_shaping.settings.base import ConfigError, short
 from reacher_shaping.settings.study import load_study, read_settings
@@ -55,9 +56,13 @@ def tables_read(rule):
     return read_by(rule, STUDY_TABLES, "results")
 
 
-def code(script):
-    """Hash of the code a script runs: a param, so that an edit of that code and nothing else reruns its jobs."""
-    return code_hash(HERE / "workflow/scripts" / f"{script}.py")
+@cache
+def code(script, chosen=()):
+    """Hash of the code a script runs: a param, so that an edit of that code and nothing else reruns its jobs.
+
+    `chosen` is what the script looks up by name, for a cell's job its own task, potential and schedule.
+    """
+    return code_hash(HERE / "workflow/scripts" / f"{script}.py", chosen)
 
 
 def one_of(names):

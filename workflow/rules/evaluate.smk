@@ -19,7 +19,7 @@ rule evaluate_block:
         evaluation=as_json(STUDY.evaluation.model_dump()),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
         root_seed=STUDY.root_seed,
-        code=code("evaluate_block"),
+        code=lambda wildcards: code("evaluate_block", CELLS[wildcards.cell].chosen_code[:1]),
     script:
         "../scripts/evaluate_block.py"
 
@@ -38,7 +38,7 @@ rule evaluate_long:
         evaluation=as_json(STUDY.evaluation.model_dump()),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
         root_seed=STUDY.root_seed,
-        code=code("evaluate_long"),
+        code=lambda wildcards: code("evaluate_long", CELLS[wildcards.cell].chosen_code[:1]),
     script:
         "../scripts/evaluate_long.py"
 

@@ -30,6 +30,6 @@ rule train_block:
         cell=lambda wildcards: as_json(CELLS[wildcards.cell].settings()),
         seeds=lambda wildcards: list(SEEDS[wildcards.block]),
         radius=STUDY.evaluation.radius,
-        code=code("train_block"),
+        code=lambda wildcards: code("train_block", CELLS[wildcards.cell].chosen_code),
     script:
         "../scripts/train_block.py"

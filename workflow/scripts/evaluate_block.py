@@ -14,6 +14,7 @@ from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import read_json, write_json, write_table
 from reacher_shaping.storage.policy_format import read_policy
 from reacher_shaping.storage.provenance import Record, merged_manifest, unchanged
+from reacher_shaping.tasks.base import load_task
 from reacher_shaping.training.policy import Policy
 
 record = Record()
@@ -24,7 +25,7 @@ environment = Environment.model_validate_json(params.environment)
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     trained = read_policy(unchanged(snakemake.input.policy))
-    policy = Policy.from_weights(trained.weights)
+    policy = Policy.from_weights(trained.weights, load_task(environment.task))
     frames = [
         evaluate(
             policy.act,
@@ -32,8 +33,7 @@ with logged(snakemake.log[0]):
             mode=mode,
             episodes=evaluation.episodes,
             radius=evaluation.radius,
-            control_weight=environment.control_weight,
-            clip_actions=environment.clip_actions,
+            environment=environment,
             root_seed=params.root_seed,
         )
         for mode in ("stochastic", "deterministic")
@@ -41,6 +41,12 @@ with logged(snakemake.log[0]):
     episodes = pd.concat(frames, ignore_index=True)
     write_table(snakemake.output.episodes, episodes, block_schemas.EPISODES)
     files = [Path(snakemake.output.episodes)]
-    part = record.to_dict(block, [Path(snakemake.input.policy)], files, 50 * len(episodes), snakemake.threads)
+    part = record.to_dict(
+        block,
+        [Path(snakemake.input.policy)],
+        files,
+        load_task(environment.task).episode_steps * len(episodes),
+        snakemake.threads,
+    )
     part = {"settings": json.loads(params.evaluation), "code": params.code, **part}
     write_json(snakemake.output.manifest, merged_manifest(read_json(snakemake.input.training), part))

@@ -22,8 +22,7 @@ with logged(snakemake.log[0]):
         evaluate_controllers(
             episodes=evaluation.episodes,
             radius=evaluation.radius,
-            control_weight=protocol.environment.control_weight,
-            clip_actions=protocol.environment.clip_actions,
+            environment=protocol.environment,
             network=protocol.ppo,
             root_seed=params.root_seed,
         ).assign(protocol=protocol.name)

@@ -10,6 +10,7 @@ from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import write_table
 from reacher_shaping.storage.policy_format import read_policy
 from reacher_shaping.storage.provenance import unchanged
+from reacher_shaping.tasks.base import load_task
 from reacher_shaping.training.policy import Policy
 
 params = snakemake.params
@@ -19,12 +20,11 @@ with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     trained = read_policy(unchanged(snakemake.input.policy))
     long = evaluate_lengths(
-        Policy.from_weights(trained.weights).act,
+        Policy.from_weights(trained.weights, load_task(environment.task)).act,
         trained.seeds,
         mode="stochastic",
         radius=Evaluation.model_validate_json(params.evaluation).radius,
-        control_weight=environment.control_weight,
-        clip_actions=environment.clip_actions,
+        environment=environment,
         root_seed=params.root_seed,
     )
     write_table(snakemake.output[0], long, block_schemas.LONG_EPISODES)

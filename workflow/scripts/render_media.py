@@ -7,6 +7,7 @@ from reacher_shaping.evaluation import video
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.storage.policy_format import read_policy
 from reacher_shaping.storage.provenance import unchanged
+from reacher_shaping.tasks.base import load_task
 from reacher_shaping.training.policy import Policy
 
 params = snakemake.params
@@ -15,14 +16,14 @@ environment = Environment.model_validate_json(params.environment)
 with logged(snakemake.log[0]):
     torch.set_num_threads(snakemake.threads)
     trained = read_policy(unchanged(snakemake.input[0]))
-    first = Policy.from_weights({name: tensor[:1] for name, tensor in trained.weights.items()})
+    weights = {name: tensor[:1] for name, tensor in trained.weights.items()}
+    first = Policy.from_weights(weights, load_task(environment.task))
     episode = video.evaluation_episode(
         first.act,
         trained.seeds[0],
         mode="stochastic",
         radius=params.radius,
-        control_weight=environment.control_weight,
-        clip_actions=environment.clip_actions,
+        environment=environment,
         root_seed=params.root_seed,
     )
     pictures = video.frames(episode, f"{snakemake.wildcards.name}, seed {trained.seeds[0]}")

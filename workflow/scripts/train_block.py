@@ -13,10 +13,12 @@ from reacher_shaping.storage.code_hash import reached_files
 from reacher_shaping.storage.files import write_json, write_monitors, write_table
 from reacher_shaping.storage.policy_format import write_policy
 from reacher_shaping.storage.provenance import Record
+from reacher_shaping.tasks.base import load_task
 
 record = Record()
 params, output = snakemake.params, snakemake.output
 cell = Cell.model_validate_json(params.cell)
+task = load_task(cell.protocol.environment.task)
 block = Path(output.policy).parent
 key = hashlib.sha256(json.dumps([params.cell, params.seeds, params.radius, params.code]).encode()).hexdigest()[:16]
 settings = {"cell": cell.settings(), "radius": params.radius}
@@ -26,12 +28,12 @@ with logged(snakemake.log[0]) as say:
     with training_job.trained_block(
         cell, params.seeds, radius=params.radius, folder=checkpoints, report=say, record=record
     ) as (state, _):
-        weights = state.policy(cell).weights()
+        weights = state.policy().weights()
         write_policy(output.policy, params.seeds, weights, settings)
         write_table(output.progress, state.progress_frame(), block_schemas.PROGRESS)
-        write_monitors(output.monitor, state.episodes_frame())
+        write_monitors(output.monitor, state.episodes_frame(), task.gymnasium_id, task.step_seconds)
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
-        steps = state.iteration * cell.protocol.ppo.rollout_steps * len(params.seeds)
-        training = record.to_dict(block, reached_files(__file__), files, steps, snakemake.threads)
+        steps = state.iteration * state.plan.steps * len(params.seeds)
+        training = record.to_dict(block, reached_files(__file__, cell.chosen_code), files, steps, snakemake.threads)
         who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
         write_json(output.training, {**who, **training})

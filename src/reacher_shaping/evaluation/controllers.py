@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from scipy import stats as distributions
 
 from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
-from reacher_shaping.settings.cell import PPO
+from reacher_shaping.settings.cell import PPO, Environment
 from reacher_shaping.stats import wilson_interval
-from reacher_shaping.training.policy import Policy, initialise
+from reacher_shaping.tasks.base import load_task
+from reacher_shaping.training.policy import Policy, Shape, initialise
 
 Array = NDArray[np.float64]
 Noise = NDArray[np.float32] | None
@@ -60,9 +61,10 @@ def clipped_gaussian(observation: Array, noise: Noise) -> NDArray[np.float32]:
     return _required(noise).clip(-1.0, 1.0)
 
 
-def untrained_network(root_seed: int, settings: PPO) -> Actor:
+def untrained_network(root_seed: int, task: str, settings: PPO) -> Actor:
     """The network that run seed 0 starts its training from."""
-    return Policy(initialise([0], root_seed, settings), settings.hidden_units, settings.towers).act
+    shape = Shape.of(load_task(task), settings)
+    return Policy(initialise([0], root_seed, settings, shape), shape).act
 
 
 def reach(gains: Gains) -> Actor:
@@ -111,9 +113,8 @@ def evaluate_controllers(
     *,
     episodes: int,
     radius: float,
-    control_weight: float,
+    environment: Environment,
     root_seed: int,
-    clip_actions: bool = False,
     network: PPO | None = None,
 ) -> pd.DataFrame:
     """Evaluate all reference policies; the arguments are those of `evaluate.evaluate`, and the untrained network's.
@@ -123,13 +124,14 @@ def evaluate_controllers(
     mean_return_high`, and the means `final_success_rate, final_distance, min_distance` (m), `reward_distance,
     reward_control`. Both intervals are over episodes.
     """
+    control_weight = environment.control_weight
     gains = TUNED_GAINS[min(TUNED_GAINS, key=lambda weight: abs(weight - control_weight))]
     actors: Sequence[tuple[str, Mode, Actor]] = [
         ("zero action", "deterministic", zero),
         ("uniform random", "stochastic", uniform),
         ("unit Gaussian", "stochastic", gaussian),
         ("unit Gaussian, clipped", "stochastic", clipped_gaussian),
-        ("untrained network", "stochastic", untrained_network(root_seed, network or PPO())),
+        ("untrained network", "stochastic", untrained_network(root_seed, environment.task, network or PPO())),
         ("inverse kinematics + PD", "deterministic", reach(gains)),
     ]
     rows = []
@@ -140,9 +142,8 @@ def evaluate_controllers(
             mode=mode,
             episodes=episodes,
             radius=radius,
-            control_weight=control_weight,
+            environment=environment,
             root_seed=root_seed,
-            clip_actions=clip_actions,
         )
         row = {"controller": name, "mode": mode, "episodes": episodes, "control_weight": control_weight}
         rows.append(row | _summary(frame))

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
-from reacher_shaping.tasks.reacher import EPISODE_STEPS
+from reacher_shaping.settings.cell import Environment
 
-LENGTHS = (EPISODE_STEPS, 100, 200, 500)
+LENGTHS = (50, 100, 200, 500)
 """Environment steps of an episode; 50 is Reacher-v5's own, 500 are 10 simulated seconds."""
 EPISODES = 50
 """Episodes a run and length: few, since a cell's interval is over its seeds, which differ by more."""
@@ -19,9 +19,8 @@ def evaluate_lengths(
     *,
     mode: Mode,
     radius: float,
-    control_weight: float,
+    environment: Environment,
     root_seed: int,
-    clip_actions: bool = False,
     episodes: int = EPISODES,
     lengths: Sequence[int] = LENGTHS,
 ) -> pd.DataFrame:
@@ -40,9 +39,8 @@ def evaluate_lengths(
             mode=mode,
             episodes=episodes,
             radius=radius,
-            control_weight=control_weight,
+            environment=environment,
             root_seed=root_seed,
-            clip_actions=clip_actions,
             steps=steps,
         )
         grouped = frame.groupby("seed", sort=False)

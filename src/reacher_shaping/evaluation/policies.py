@@ -12,6 +12,7 @@ from reacher_shaping.settings.cell import Cell, Environment
 from reacher_shaping.storage.files import ArtifactError
 from reacher_shaping.storage.policy_format import load_tensors, read_policy
 from reacher_shaping.storage.provenance import recorded_checksum, unchanged
+from reacher_shaping.tasks.base import load_task
 from reacher_shaping.training.policy import Policy
 
 RELEASED = Environment(control_weight=1.0)
@@ -69,20 +70,21 @@ def _ours(path: Path | str) -> Trained:
     cell = Cell.model_validate_json(json.dumps(stored.settings["cell"]))
     if len(set(stored.seeds)) != len(stored.seeds):
         raise ValueError(f"a seed is there twice among {stored.seeds}")
-    policy, environment = _policy(stored.weights), cell.protocol.environment
+    environment = cell.protocol.environment
+    policy = _policy(stored.weights, environment.task)
     return Trained(cell.name, stored.seeds, policy, environment, cell.root_seed, "as in its training")
 
 
 def _released(state: Mapping[str, Any]) -> Trained:
     one = {name: tensor.unsqueeze(0) if isinstance(tensor, torch.Tensor) else tensor for name, tensor in state.items()}
-    return Trained("", [0], _policy(one), RELEASED, 0, "as for the released runs")
+    return Trained("", [0], _policy(one, RELEASED.task), RELEASED, 0, "as for the released runs")
 
 
-def _policy(weights: Mapping[str, Any]) -> Policy:
+def _policy(weights: Mapping[str, Any], task: str) -> Policy:
     for name, tensor in weights.items():
         if not isinstance(name, str):
             raise ValueError(f"{name!r} is no name of a tensor")
         if isinstance(tensor, torch.Tensor) and (tensor.layout != torch.strided or tensor.device.type != "cpu"):
             raise ValueError(f"{name} is no plain tensor")
     with torch.no_grad():
-        return Policy.from_weights(weights)
+        return Policy.from_weights(weights, load_task(task))

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
+from reacher_shaping.settings.cell import Environment
 from reacher_shaping.storage.files import replacing
-from reacher_shaping.tasks.reacher import STEP_SECONDS
+from reacher_shaping.tasks.base import load_task
 from reacher_shaping.tasks.rendering import Pixels, drawn, find_opengl, rendered
 
 SIZE = 320
@@ -40,16 +41,18 @@ class Episode:
         distances: [T + 1] fingertip to target in m.
         episode_return: sum of the environment's own reward.
         radius: m; success is a distance of at most `radius` after any step.
+        step_seconds: simulated seconds from a position to the next.
     """
 
     positions: NDArray[np.float64]
     distances: NDArray[np.float64]
     episode_return: float
     radius: float
+    step_seconds: float
 
 
 def evaluation_episode(
-    act: Actor, seed: int, *, mode: Mode, radius: float, control_weight: float, root_seed: int, clip_actions: bool
+    act: Actor, seed: int, *, mode: Mode, radius: float, environment: Environment, root_seed: int
 ) -> Episode:
     """Return the first evaluation episode of a policy; `act` is an actor of S = 1, `seed` its name."""
     seen: list[NDArray[np.float64]] = []
@@ -67,15 +70,15 @@ def evaluation_episode(
         mode=mode,
         episodes=1,
         radius=radius,
-        control_weight=control_weight,
+        environment=environment,
         root_seed=root_seed,
-        clip_actions=clip_actions,
     ).iloc[0]
     seen.append(latest[0, 0].copy())  # the lanes' array is overwritten in place: it holds the state after the last step
     observations = np.stack(seen)
     angles = np.arctan2(observations[:, 2:4], observations[:, 0:2])
     distances = np.linalg.norm(observations[:, 8:10], axis=-1)
-    return Episode(np.hstack([angles, observations[:, 4:6]]), distances, float(row["episode_return"]), radius)
+    seconds = load_task(environment.task).step_seconds
+    return Episode(np.hstack([angles, observations[:, 4:6]]), distances, float(row["episode_return"]), radius, seconds)
 
 
 def frames(episode: Episode, title: str) -> list[Image.Image]:
@@ -86,7 +89,7 @@ def frames(episode: Episode, title: str) -> list[Image.Image]:
     font = _fitting_font(words)
     with pictures as picture:
         return [
-            _captioned(picture(position), words, font, step, distance, episode.radius)
+            _captioned(picture(position), words, font, step * episode.step_seconds, distance, episode.radius)
             for step, (position, distance) in enumerate(zip(episode.positions, episode.distances, strict=True))
         ]
 
@@ -132,14 +135,14 @@ WRITERS: Mapping[str, Callable[[Path, Sequence[Image.Image]], None]] = {".gif": 
 
 
 def _captioned(
-    pixels: Pixels, words: Sequence[str], font: Font, step: int, distance: float, radius: float
+    pixels: Pixels, words: Sequence[str], font: Font, seconds: float, distance: float, radius: float
 ) -> Image.Image:
     """Return the picture with a strip of text below it; the last line is green while the tip is on the target."""
     image = Image.new("RGB", (SIZE, SIZE + STRIP), "white")
     image.paste(Image.fromarray(pixels))
     canvas = ImageDraw.Draw(image)
-    now = f"{step * STEP_SECONDS:.2f} s: tip {1000 * distance:.0f} mm from the target"
-    colors = ["black", "black", "#00795c" if distance <= radius and step else "#b3261e"]
+    now = f"{seconds:.2f} s: tip {1000 * distance:.0f} mm from the target"
+    colors = ["black", "black", "#00795c" if distance <= radius and seconds else "#b3261e"]
     for line, (text, color) in enumerate(zip([*words, now], colors, strict=True)):
         canvas.text((6, SIZE + 3 + 20 * line), text, fill=color, font=font)
     return image

@@ -1,4 +1,4 @@
-"""The demo in a window: trained policies in Gymnasium's own Reacher-v5."""
+"""The demo in a window: trained policies in Gymnasium's own environment."""
 
 import os
 import sys
@@ -8,7 +8,8 @@ import numpy as np
 
 from reacher_shaping.evaluation.evaluate import Actor, Mode
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, draw_reset
+from reacher_shaping.settings.cell import Environment
+from reacher_shaping.tasks.base import load_task
 
 
 class NoDisplayError(RuntimeError):
@@ -23,7 +24,7 @@ def require_display() -> None:
         )
 
 
-def play(act: Actor, *, episodes: int, mode: Mode, control_weight: float, root_seed: int, clip_actions: bool) -> float:
+def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, root_seed: int) -> float:
     """Show episodes on the study's evaluation resets, until the last or until the window is closed.
 
     `act` is an actor of S = 1. Returns the mean return of the episodes shown to their end, NaN if there are none.
@@ -32,26 +33,27 @@ def play(act: Actor, *, episodes: int, mode: Mode, control_weight: float, root_s
     require_display()
     import gymnasium  # not above: the other commands do without it
 
-    environment = gymnasium.make("Reacher-v5", render_mode="human", reward_control_weight=control_weight)
-    arm: Any = environment.unwrapped
+    task = load_task(environment.task)
+    shown = gymnasium.make(task.gymnasium_id, render_mode="human", reward_control_weight=environment.control_weight)
+    arm: Any = shown.unwrapped
     resets, noise = stream(root_seed, Purpose.EVALUATION_RESETS), stream(root_seed, Purpose.EVALUATION_ACTIONS)
     returns: list[float] = []
     try:
         while len(returns) < episodes and not _closed(arm):
-            environment.reset(seed=0)
-            arm.set_state(*draw_reset(resets))
+            shown.reset(seed=0)
+            arm.set_state(*np.split(task.draw_reset(resets), 2))
             observation, total = arm._get_obs(), 0.0
-            draws = noise.standard_normal((EPISODE_STEPS, ACTION_SIZE), dtype=np.float32)
+            draws = noise.standard_normal((task.episode_steps, task.action_size), dtype=np.float32)
             for draw in draws:
                 action = act(observation[None, None], draw[None, None] if mode == "stochastic" else None)[0, 0]
-                observation, reward, *_ = environment.step(action.clip(-1, 1) if clip_actions else action)
+                observation, reward, *_ = shown.step(action.clip(-1, 1) if environment.clip_actions else action)
                 total += float(reward)
                 if _closed(arm):
                     break
             else:
                 returns.append(total)
     finally:
-        environment.close()
+        shown.close()
     return float(np.mean(returns)) if returns else float("nan")
 
 

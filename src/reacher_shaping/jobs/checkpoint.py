@@ -13,7 +13,9 @@ import torch
 
 from reacher_shaping.storage.files import ArtifactError, read_sealed, write_sealed
 from reacher_shaping.storage.policy_format import load_tensors
+from reacher_shaping.training.policy import Shape
 from reacher_shaping.training.ppo import Adam
+from reacher_shaping.training.rollout import Plan
 from reacher_shaping.training.train import TrainState
 
 
@@ -25,12 +27,14 @@ def save_checkpoint(path: Path, state: TrainState, seconds: tuple[float, float] 
     content = {
         "training": path.parent.name,
         "seeds": list(state.seeds),
+        "shape": list(state.shape),
         "iteration": state.iteration,
         "rows": state.rows,
         "adam": {"first": state.adam.first, "second": state.adam.second, "steps": state.adam.steps},
         "progress": {name: torch.from_numpy(values) for name, values in state.progress.items()},
         "episode_returns": torch.from_numpy(state.episode_returns),
-        "rollout_steps": state.rollout_steps,
+        "plan": [state.plan.steps, state.plan.episode_steps],
+        "schedule": {name: torch.from_numpy(values) for name, values in state.schedule.items()},
         "unlogged": torch.from_numpy(state.unlogged),
         "seconds": list(seconds),
     }
@@ -51,12 +55,14 @@ def load_checkpoint(path: Path) -> tuple[TrainState, tuple[float, float]]:
         wall, cpu = content["seconds"]
         state = TrainState(
             seeds=tuple(content["seeds"]),
+            shape=Shape(*content["shape"]),
             rows=content["rows"],
             adam=Adam(**content["adam"]),
             iteration=content["iteration"],
             progress={name: values.numpy() for name, values in content["progress"].items()},
             episode_returns=content["episode_returns"].numpy(),
-            rollout_steps=content["rollout_steps"],
+            plan=Plan(*content["plan"]),
+            schedule={name: values.numpy() for name, values in content["schedule"].items()},
             unlogged=content["unlogged"].numpy(),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -19,6 +19,7 @@ from reacher_shaping.evaluation.metrics import evaluation_metrics
 from reacher_shaping.jobs.progress import Meter
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.tasks.base import load_task
 
 Report = Callable[[str], None]
 MODES = ("stochastic", "deterministic")
@@ -34,7 +35,9 @@ def train(algorithm: str, seed: int, budget: int, protocol: Protocol, report: Re
     import stable_baselines3  # here, since it is heavy and used by this optional target alone
 
     torch.set_num_threads(1)
-    environment = gymnasium.make("Reacher-v5", reward_control_weight=protocol.environment.control_weight)
+    environment = gymnasium.make(
+        load_task(protocol.environment.task).gymnasium_id, reward_control_weight=protocol.environment.control_weight
+    )
     make = {"ppo": stable_baselines3.PPO, "sac": stable_baselines3.SAC, "td3": stable_baselines3.TD3}[algorithm]
     model = make("MlpPolicy", environment, seed=seed, device="cpu", **_settings(algorithm, protocol))
     meter = Meter(math.ceil(budget / STEPS_PER_LOOK), STEPS_PER_LOOK, unit="thousand steps")
@@ -97,7 +100,7 @@ def peer_run(
             mode="stochastic" if mode == "stochastic" else "deterministic",
             episodes=evaluation.episodes,
             radius=evaluation.radius,
-            control_weight=protocol.environment.control_weight,
+            environment=protocol.environment.model_copy(update={"clip_actions": False}),  # the peers clip themselves
             root_seed=root_seed,
         )
         measured = evaluation_metrics(episodes, mode).drop(columns="episodes").iloc[0]

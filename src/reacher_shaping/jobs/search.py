@@ -45,15 +45,13 @@ def score(cell: Cell, seeds: int, *, episodes: int, radius: float) -> dict[str, 
     names = list(range(seeds))
     for state in train(cell, names, radius=radius):
         trained = state
-    environment = cell.protocol.environment
     rows = evaluate(
-        trained.policy(cell).act,
+        trained.policy().act,
         names,
         mode="stochastic",
         episodes=episodes,
         radius=radius,
-        control_weight=environment.control_weight,
-        clip_actions=environment.clip_actions,
+        environment=cell.protocol.environment,
         root_seed=cell.root_seed,
     )
     return {name: float(rows[column].mean()) for name, column in MEASURES.items()}

@@ -7,22 +7,30 @@ graph of jobs fast.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from reacher_shaping.settings.base import Count, Fraction, Name, NonNegative, Positive, Seed, Settings, Whole, plain
+from reacher_shaping.storage.code_hash import defined_names, modules_defining
 
 Alpha0 = Annotated[float, Field(ge=1e-6, le=1e6)]
 """The shaping weight at t = 0, without unit; bounded because it names the cell's folder in plain digits."""
 
-EPISODE_STEPS = 50
-"""Environment steps of an episode of Reacher-v5; the simulation's own constant, which would load MuJoCo."""
+if TYPE_CHECKING:
+    TaskName = str
+    PotentialName = str
+    ScheduleName = str
+else:  # what there is, read from the code without running it
+    TaskName = Literal[modules_defining("tasks", "TASK")]
+    PotentialName = Literal[defined_names("training.potentials")]
+    ScheduleName = Literal[defined_names("training.schedules")]
 
 
 class Environment(Settings):
-    """What surrounds Reacher-v5: the weight of the control cost, and whether actions are clipped to [-1, 1]."""
+    """The task, the weight of its control cost, and whether actions are clipped to [-1, 1]."""
 
+    task: TaskName = Field("reacher", exclude_if=lambda task: task == "reacher")
     control_weight: NonNegative = 0.1
     clip_actions: bool = False
 
@@ -91,22 +99,13 @@ class Protocol(Settings):
     shaping: Shaping = Shaping()
     log: Log = Log()
 
-    @model_validator(mode="after")
-    def _there_is_something_to_log(self) -> Self:
-        if self.log.episode_return == "released" and self.ppo.rollout_steps < EPISODE_STEPS:
-            raise ValueError(
-                f"log.episode_return = 'released' needs a whole episode in a rollout; ppo.rollout_steps = "
-                f"{self.ppo.rollout_steps}; allowed: >= {EPISODE_STEPS}"
-            )
-        return self
-
 
 class Variant(Settings):
     """One shaping rule: a potential and the schedule of its weight; `horizon` is in environment steps."""
 
     name: Name
-    potential: Literal["none", "l2", "l2sq"]
-    schedule: Literal["constant", "linear"] = "constant"
+    potential: PotentialName
+    schedule: ScheduleName = "constant"
     horizon: Count | None = None
 
     @model_validator(mode="after")
@@ -163,6 +162,21 @@ class Cell(Settings):
     def iterations(self) -> int:
         """Rollouts of the run: the budget rounded up to whole rollouts, ceil(budget / rollout_steps)."""
         return -(-self.budget // self.protocol.ppo.rollout_steps)
+
+    @property
+    def potential(self) -> str:
+        """Name of the potential in use: the variant's own, but for a protocol that has one for every decay."""
+        rule, decays = self.protocol.shaping.decay_potential, self.variant.horizon is not None
+        return rule if decays and rule != "variant" else self.variant.potential
+
+    @property
+    def chosen_code(self) -> tuple[str, ...]:
+        """What the cell's training looks up by name, as `module:name` below the package."""
+        return (
+            f"tasks.{self.protocol.environment.task}:TASK",
+            f"training.potentials:{self.potential}",
+            f"training.schedules:{self.variant.schedule}",
+        )
 
     @property
     def key(self) -> dict[str, str | int | float]:

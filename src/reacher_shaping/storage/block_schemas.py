@@ -36,6 +36,7 @@ MEASURES = (
     "value_loss",
     "explained_variance",
     "logged_return",
+    "alpha",
 )
 """The measures of a training iteration."""
 _EPISODE_NUMBERS = ("episode_return", "reward_distance", "reward_control", "min_distance", "final_distance")

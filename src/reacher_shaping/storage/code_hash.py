@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -19,18 +20,21 @@ WHOLE = "*"  # in place of a definition's name: all definitions of its module
 Definition = tuple[str, str]  # (module, name)
 
 
-def code_hash(script: Path | str) -> str:
+def code_hash(script: Path | str, chosen: tuple[str, ...] = ()) -> str:
     """Hash of the code that a Python script runs in itself and in this package, as hexadecimal text.
 
-    Found by reading, not by running: names reached through `getattr` or `import_module` are not seen. Raises
-    SyntaxError or OSError for a script that cannot be read, ValueError for an import that cannot be followed.
+    Found by reading, not by running: names reached through `getattr` or `import_module` are not seen, but for those
+    that are said to be `chosen`, each as `module:name`. Raises SyntaxError or OSError for a script that cannot be read,
+    ValueError for an import that cannot be followed or a chosen name that is not defined.
     """
-    code = reachable_code(Path(script))
+    code = reachable_code(Path(script), chosen)
     return hashlib.sha256("\n".join(f"{where}: {code[where]}" for where in sorted(code)).encode()).hexdigest()
 
 
-def reachable_code(script: Path) -> dict[str, str]:
+def reachable_code(script: Path, chosen: Iterable[str] = ()) -> dict[str, str]:
     """Source without comments, docstrings and layout of the script and of every definition of the package it reaches.
+
+    To these belong the `chosen` ones, which a script looks up by name, each as `module:name`.
 
     Keys are `script` and `module:name`, modules named below the package; statements of a reached module that define
     no name stand under `module:`.
@@ -38,6 +42,11 @@ def reachable_code(script: Path) -> dict[str, str]:
     start = _Source(script)
     code = {"script": _normalised(start.tree)}
     waiting = start.references(start.tree)
+    for where in chosen:
+        module, _, name = where.partition(":")
+        if name not in _source(module).definitions:
+            raise ValueError(f"{where} is not defined")
+        waiting.add((module, name))
     while waiting:
         module, name = waiting.pop()
         if module in NEUTRAL:
@@ -53,10 +62,21 @@ def reachable_code(script: Path) -> dict[str, str]:
     return code
 
 
-def reached_files(script: Path | str) -> list[Path]:
+def reached_files(script: Path | str, chosen: Iterable[str] = ()) -> list[Path]:
     """The script and the package's modules it reaches, less those that never change a result."""
-    modules = sorted({where.split(":")[0] for where in reachable_code(Path(script))} - {"script"})
+    modules = sorted({where.split(":")[0] for where in reachable_code(Path(script), chosen)} - {"script"})
     return [Path(script), *map(_path, modules)]
+
+
+def defined_names(module: str) -> tuple[str, ...]:
+    """Names that a module of the package defines, in its order, but for those that begin with an underscore."""
+    return tuple(name for name in _source(module).definitions if name and not name.startswith("_"))
+
+
+def modules_defining(folder: str, name: str) -> tuple[str, ...]:
+    """Names of the modules in a folder of the package that define a name, in alphabetical order."""
+    modules = sorted(path.stem for path in (FOLDER / folder).glob("*.py"))
+    return tuple(module for module in modules if name in _source(f"{folder}.{module}").definitions)
 
 
 class _Source:

@@ -23,8 +23,6 @@ import pyarrow.parquet as pq
 
 from reacher_shaping.storage.block_schemas import INTEGER, NUMBER, Table
 
-SECONDS_PER_STEP = 0.02  # simulated time of one environment step: two MuJoCo steps of 0.01 s
-
 
 class ArtifactError(RuntimeError):
     """A file is missing, damaged or not what its name says; the message names it and how to repair it."""
@@ -169,17 +167,17 @@ def read_sealed(path: Path | str) -> bytes:
     return stored[32:]
 
 
-def write_monitors(folder: Path | str, episodes: pd.DataFrame) -> None:
+def write_monitors(folder: Path | str, episodes: pd.DataFrame, environment: str, step_seconds: float) -> None:
     """Write one `<seed>.monitor.csv` per run, as Stable-Baselines3's Monitor does: episode return, length and time.
 
     episodes: a row per training episode, in order, columns `seed, episode_return, episode_length, env_steps`
-    (`env_steps`: environment steps of the run up to the episode's end). The time column is simulated seconds, so
-    that equal runs give equal files.
+    (`env_steps`: environment steps of the run up to the episode's end); environment: its id; step_seconds: simulated
+    seconds of one of its steps. The time column is simulated seconds, so that equal runs give equal files.
     """
-    header = json.dumps({"t_start": 0.0, "env_id": "Reacher-v5"})
+    header = json.dumps({"t_start": 0.0, "env_id": environment})
     for seed, run in episodes.groupby("seed"):
         rows = zip(run["episode_return"], run["episode_length"], run["env_steps"], strict=True)
-        lines = [f"{value:.6f},{length:.0f},{steps * SECONDS_PER_STEP:.2f}" for value, length, steps in rows]
+        lines = [f"{value:.6f},{length:.0f},{steps * step_seconds:.2f}" for value, length, steps in rows]
         write_text(Path(folder) / f"{seed}.monitor.csv", "\n".join([f"#{header}", "r,l,t", *lines, ""]))
 
 

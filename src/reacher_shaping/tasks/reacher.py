@@ -1,28 +1,30 @@
-"""Many copies of Gymnasium's Reacher-v5 side by side: lanes, bit-equal to the original.
+"""Gymnasium's Reacher-v5: two joints bring a fingertip to a target.
 
-A lane is one MuJoCo simulation. All lanes share the model and step in lock-step; every number a
-lane gives (observation, distance, control cost) is the one `gymnasium.make("Reacher-v5")` gives for
-the same reset draws and actions. Source: gymnasium/envs/mujoco/reacher_v5.py and its reacher.xml.
+| observation | | unit |
+|---|---|---|
+| 0, 1 | cosine of the shoulder's and the elbow's angle | |
+| 2, 3 | their sine | |
+| 4, 5 | target x, y | m |
+| 6, 7 | angular velocities | rad/s |
+| 8, 9 | fingertip less target x, y | m |
+
+Actions are two torques in [-1, 1], clamped by the actuators. Source: gymnasium/envs/mujoco/reacher_v5.py and its
+reacher.xml.
 """
 
-import ctypes
-from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
-EPISODE_STEPS = 50
-"""Environment steps before truncation, Gymnasium's registration of Reacher-v5."""
-STEP_SECONDS = 0.02
-"""Simulated seconds of one environment step: two solver steps of 0.01 s."""
-OBSERVATION_SIZE = 10
-ACTION_SIZE = 2
-_FRAME_SKIP = 2
-Array = NDArray[np.float64]
+from reacher_shaping.tasks.base import Array, Bounds, Data, Task, finite_controls
+
+TARGET_ORIGIN = np.array([0.1, -0.1, 0.01])
+"""m; position of the target's body in reacher.xml, and the reference of its two slides."""
+TIP = 3
+"""The fingertip among the bodies."""
 
 
 def model_file() -> Path:
@@ -37,32 +39,33 @@ def model_file() -> Path:
     return Path(package.origin).parent / "envs" / "mujoco" / "assets" / "reacher.xml"
 
 
-def load_model(*, contacts: bool = False) -> mujoco.MjModel:
-    """Load Gymnasium's reacher model.
+def load_model() -> mujoco.MjModel:
+    """Load Gymnasium's reacher model."""
+    return mujoco.MjModel.from_xml_path(str(model_file()))
 
-    No pair of its geometries can collide, so collision detection is left out unless `contacts`:
-    the same bits for a tenth to a third less time.
+
+def arm_model() -> mujoco.MjModel:
+    """Return the model without what moves nothing: its geometries, no pair of which can collide, and the target.
+
+    The bodies keep the inertia that their geometries gave them, and the solver the measure of the whole model by which
+    it ends its iterations, so that the bits at a joint limit are those of the whole.
     """
-    model = mujoco.MjModel.from_xml_path(str(model_file()))
-    if not contacts:
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    whole = load_model()
+    arm = mujoco.MjSpec.from_file(str(model_file()))
+    arm.delete(arm.body("target"))
+    for body in arm.bodies[1:]:
+        given = whole.body(body.name)
+        body.mass, body.inertia, body.ipos, body.iquat = given.mass[0], given.inertia, given.ipos, given.iquat
+        body.explicitinertial = True
+    for geometry in list(arm.geoms):
+        arm.delete(geometry)
+    arm.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    model = arm.compile()
+    model.stat.meaninertia = whole.stat.meaninertia * whole.nv / model.nv
     return model
 
 
-def profiling_clock() -> ctypes.c_void_p:
-    """Return MuJoCo's own variable `mjcb_time`: the address of the function it reads the time from, None for no timing.
-
-    The Python package installs a clock when it is imported, for the profile in `MjData.timer`, and cannot take it out
-    again; reading it takes a third of `mj_step` at this model's size. It enters no number of a simulation. Where the
-    library has not its usual name, a variable of ours stands in, and the clock goes on.
-    """
-    library = next(Path(mujoco.__file__).parent.glob("libmujoco*"), None)
-    if library is None:
-        return ctypes.c_void_p()
-    return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
-
-
-def draw_reset(generator: np.random.Generator) -> tuple[Array, Array]:
+def draw_reset(generator: np.random.Generator) -> Array:
     """Draw (joint positions [4], joint velocities [4]) as `ReacherEnv.reset_model` does.
 
     The order and shape of the draws are Gymnasium's, so a generator in the same state gives the
@@ -76,118 +79,75 @@ def draw_reset(generator: np.random.Generator) -> tuple[Array, Array]:
     position[2:] = target
     velocity = generator.uniform(low=-0.005, high=0.005, size=4)
     velocity[2:] = 0
-    return position, velocity
+    return np.concatenate([position, velocity])
 
 
-class Fields:
-    """The same fields of many simulations as one array, read and written at once.
+def restart(data: Data, draws: Array) -> None:
+    """Write the arm's angles and velocities of resets [N, 8]."""
+    data.qpos[:, :2], data.qvel[:, :2] = draws[:, 0:2], draws[:, 4:6]
 
-    MuJoCo allocates every simulation by itself, so their fields lie scattered in this process's memory, always at the
-    same addresses. One array that spans them all, indexed by these addresses, saves touching each of them from Python.
-    What lies between the fields is not ours and never touched.
+
+def control(data: Data, action: NDArray[np.floating]) -> None:
+    """Write torques [N, 2]."""
+    data.ctrl[:] = finite_controls(action)
+
+
+def observe(data: Data, draws: Array, observation: Array, measured: Array) -> None:
+    """Read the observation [N, 10] and the distance [N, 1] of fingertip and target.
+
+    Body positions are those left by the integrator's last stage, not those of the final joint angles: Gymnasium's
+    observation and reward read the same. The target rests where its slides put it.
     """
-
-    def __init__(self, views: Sequence[Sequence[NDArray[np.float64]]]) -> None:
-        """Bind one row of views per simulation; all rows hold as many numbers.
-
-        Raises ValueError for a view that is not a vector of float64, whole in memory: nothing else can be addressed so.
-        """
-        self._views = views  # keeps the simulations alive
-        addresses = np.array([np.concatenate([_addresses(view) for view in row]) for row in views])
-        first = min((view for row in views for view in row), key=lambda view: view.ctypes.data)
-        self._index, rest = np.divmod(addresses - first.ctypes.data, first.itemsize)
-        if rest.any():
-            raise ValueError("the views are not aligned to each other")
-        self._memory = as_strided(first, shape=(int(self._index.max()) + 1,))
-
-    def read(self) -> Array:
-        """Return a copy of the fields, a row per simulation."""
-        values: Array = self._memory[self._index]
-        return values
-
-    def write(self, values: NDArray[np.floating]) -> None:
-        """Overwrite the fields with `values`, a row per simulation; raises ValueError for another shape than theirs."""
-        if values.shape != self._index.shape:
-            raise ValueError(f"values of shape {values.shape} for fields of shape {self._index.shape}")
-        self._memory[self._index] = values
+    offset = data.xpos[:, TIP] - target_position(draws)
+    np.cos(data.qpos[:, :2], out=observation[:, 0:2])
+    np.sin(data.qpos[:, :2], out=observation[:, 2:4])
+    observation[:, 4:6] = draws[:, 2:4]
+    observation[:, 6:8] = data.qvel[:, :2]
+    observation[:, 8:10] = offset[:, :2]
+    np.sqrt(np.vecdot(offset, offset), out=measured[:, 0])
 
 
-def _addresses(view: NDArray[np.float64]) -> NDArray[np.int64]:
-    if view.ndim != 1 or view.dtype != np.float64 or not view.flags.c_contiguous:
-        raise ValueError(f"no whole vector of float64: shape {view.shape}, {view.dtype}, strides {view.strides}")
-    return view.ctypes.data + np.arange(len(view)) * view.itemsize
+def target_position(draws: Array) -> Array:
+    """Return the position [N, 3] of the target's body, in the operations in which MuJoCo computes it."""
+    position = np.tile(TARGET_ORIGIN, (len(draws), 1))
+    position[:, :2] += draws[:, 2:4] - TARGET_ORIGIN[:2]
+    return position
 
 
-class Lanes:
-    """N simulations in lock-step, with preallocated arrays for what is read after each step.
+def dense(
+    measured: Array, control: NDArray[np.floating] | float, *, control_weight: float, success_radius: float
+) -> Array:
+    """Return r [...] = -||tip - target|| - w ||a||^2 (paper, section 3.1), of distances [..., 1] after the steps.
 
-    Attributes, valid after `reset` and refreshed by `step` (overwritten in place):
-        observation: [N, 10] float64, Gymnasium's observation.
-        distance: [N] float64, fingertip to target in m (the negative of Gymnasium's reward_dist).
+    `control` is in the precision of the action: Gymnasium weighs it in that precision too.
     """
-
-    def __init__(self, count: int, *, contacts: bool = False) -> None:
-        """Allocate `count` lanes; `contacts` keeps collision detection on (for measuring only).
-
-        From now on no simulation of this process is timed, see `profiling_clock`.
-        """
-        profiling_clock().value = None
-        self.model = load_model(contacts=contacts)
-        self.count = count
-        self.data = [mujoco.MjData(self.model) for _ in range(count)]
-        self.observation = np.empty((count, OBSERVATION_SIZE))
-        self.distance = np.empty(count)
-        tip = self.model.body("fingertip").id
-        target = self.model.body("target").id
-        self._controls = Fields([[data.ctrl] for data in self.data])
-        self._state = Fields([[data.qpos, data.qvel, data.qacc_warmstart, data.ctrl] for data in self.data])
-        self._resting = Fields([[data.qpos[2:], data.xpos[target]] for data in self.data])
-        self._moving = Fields([[data.qpos[:2], data.qvel[:2], data.xpos[tip]] for data in self.data])
-        self._target = np.empty((count, 3))
-
-    def reset(self, draws: Sequence[tuple[Array, Array]]) -> None:
-        """Start an episode in every lane from (positions [4], velocities [4]), one pair a lane.
-
-        The solver's last accelerations and the torques are cleared with it, as `mj_resetData` does; all else that it
-        clears is computed anew or never set here, but for the time, which runs on and enters nothing. Raises
-        ValueError if the number of pairs is not the number of lanes.
-        """
-        start = np.reshape(draws, (len(draws), -1))
-        self._state.write(np.pad(start, [(0, 0), (0, self.model.nv + self.model.nu)]))
-        for data in self.data:
-            mujoco.mj_forward(self.model, data)
-        self.observation[:, 4:6], self._target[:] = np.split(self._resting.read(), [2], axis=1)
-        self._read()
-
-    def step(self, action: NDArray[np.floating]) -> None:
-        """Advance every lane by one environment step with torques `action` [N, 2].
-
-        Torques outside [-1, 1] are clamped by the actuators, as in Gymnasium; a torque that is not
-        finite counts as zero here (MuJoCo would do the same and warn at every step). Raises ValueError
-        for another shape.
-        """
-        self._controls.write(np.where(np.isfinite(action), action, 0.0))
-        step, model = mujoco.mj_step, self.model
-        for data in self.data:
-            step(model, data, _FRAME_SKIP)
-        self._read()
-
-    def _read(self) -> None:
-        """Copy what moves from all lanes into the arrays; a target rests for its whole episode.
-
-        Body positions are those left by the integrator's last stage, not those of the final joint
-        angles: Gymnasium's observation and reward read the same.
-        """
-        angle, velocity, tip = np.split(self._moving.read(), [2, 4], axis=1)
-        offset = tip - self._target
-        np.cos(angle, out=self.observation[:, 0:2])
-        np.sin(angle, out=self.observation[:, 2:4])
-        self.observation[:, 6:8] = velocity
-        self.observation[:, 8:10] = offset[:, :2]
-        np.sqrt(np.vecdot(offset, offset), out=self.distance)
+    reward: Array = -measured[..., 0] - control_weight * control
+    return reward
 
 
-def control_cost(action: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return ||a||^2 of actions [..., 2], in the precision of the action as in Gymnasium's reward."""
-    cost: NDArray[np.floating] = np.square(action).sum(axis=-1)
-    return cost
+def sparse(
+    measured: Array, control: NDArray[np.floating] | float, *, control_weight: float, success_radius: float
+) -> Array:
+    """Return r [...] = 1 - w ||a||^2 within the success radius of the target, -w ||a||^2 elsewhere."""
+    reward: Array = (measured[..., 0] <= success_radius).astype(np.float64) - control_weight * control
+    return reward
+
+
+TASK = Task(
+    gymnasium_id="Reacher-v5",
+    model=load_model,
+    simulated_model=arm_model,
+    frame_skip=2,
+    step_seconds=0.02,
+    episode_steps=50,
+    observation_size=10,
+    action_size=2,
+    measures=("distance",),
+    fields=("qpos", "qvel", "ctrl", "xpos"),
+    draw_reset=draw_reset,
+    restart=restart,
+    control=control,
+    observe=observe,
+    rewards={"dense": dense, "sparse": sparse},
+    bounds=Bounds(distance=0.5, highest_return=0.0),  # the arm's 0.21 m and the farthest target's 0.28 m, and some
+)

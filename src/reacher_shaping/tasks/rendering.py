@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from reacher_shaping.tasks.reacher import load_model
+from reacher_shaping.tasks.reacher import TASK
 
 Pixels = NDArray[np.uint8]
 Picture = Callable[[NDArray[np.float64]], Pixels]
@@ -68,7 +68,7 @@ def rendered(opengl: str, size: int, radius: float) -> Iterator[Picture]:
 
     `opengl` is what `find_opengl` found. It is chosen here and not by MuJoCo, which decides at its import.
     """
-    model = load_model()
+    model = TASK.model()
     light = model.vis.headlight  # an even light: MuJoCo's own leaves the floor dark away from the centre
     light.ambient[:], light.diffuse[:], light.specular[:] = 0.7, 0.3, 0.0
     data = mujoco.MjData(model)

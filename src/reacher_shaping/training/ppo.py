@@ -22,8 +22,7 @@ import torch
 from torch import Tensor
 
 from reacher_shaping.settings.cell import PPO
-from reacher_shaping.tasks.reacher import ACTION_SIZE, OBSERVATION_SIZE
-from reacher_shaping.training.policy import Layers, forward, from_towers, layers, owned, to_towers
+from reacher_shaping.training.policy import Layers, Shape, forward, from_towers, layers, owned, to_towers
 
 LOG_2PI = math.log(2 * math.pi)
 BETAS = (0.9, 0.999)
@@ -33,39 +32,39 @@ BETAS = (0.9, 0.999)
 class Samples(NamedTuple):
     """All that the loss needs of N steps; sample axis last where the arithmetic runs along samples."""
 
-    features: Tensor  # [..., N, 11] network inputs
-    action: Tensor  # [..., 2, N]
+    features: Tensor  # [..., N, F + 1] network inputs
+    action: Tensor  # [..., A, N]
     log_prob: Tensor  # [..., N] under the policy that acted
     advantage: Tensor  # [..., N], normalised
     target: Tensor  # [..., N] return that the value is fitted to
 
 
 def pack(features: Tensor, action: Tensor, log_prob: Tensor, advantage: Tensor, target: Tensor) -> Tensor:
-    """Return records [S, N, 16], a row per sample: features [S, N, 11], action [S, N, 2], the others [S, N]."""
+    """Return records [S, N, F + A + 4], a row per sample: features [S, N, F + 1], action [S, N, A], others [S, N]."""
     return torch.cat([features, action, log_prob[..., None], advantage[..., None], target[..., None]], dim=-1)
 
 
-def unpack(records: Tensor) -> Samples:
-    """Return the fields of records [..., N, 16]."""
-    features, rest = records.split([OBSERVATION_SIZE + 1, ACTION_SIZE + 3], dim=-1)
+def unpack(records: Tensor, actions: int) -> Samples:
+    """Return the fields of records [..., N, F + A + 4] with A = `actions`."""
+    features, rest = records.split([records.shape[-1] - actions - 3, actions + 3], dim=-1)
     rest = rest.transpose(-1, -2).contiguous()
-    return Samples(features, rest[..., :ACTION_SIZE, :], *rest[..., ACTION_SIZE:, :].unbind(-2))
+    return Samples(features, rest[..., :actions, :], *rest[..., actions:, :].unbind(-2))
 
 
 def log_probability(deviation: Tensor, log_std: Tensor) -> Tensor:
     """Return log pi(a|s) [S, N] of independent Gaussians.
 
     Args:
-        deviation: [S, 2, N], (a - mean) / std.
-        log_std: [S, 2, 1].
+        deviation: [S, A, N], (a - mean) / std.
+        log_std: [S, A, 1].
     """
-    constant = log_std.sum(1).add_(0.5 * ACTION_SIZE * LOG_2PI)
+    constant = log_std.sum(1).add_(0.5 * log_std.shape[1] * LOG_2PI)
     return deviation.square().sum(1).mul_(-0.5).sub_(constant)
 
 
 def entropy(log_std: Tensor) -> Tensor:
-    """Return the entropy [S] of independent Gaussians with log_std [S, 2, 1]."""
-    return log_std.sum((-1, -2)) + 0.5 * ACTION_SIZE * (1 + LOG_2PI)
+    """Return the entropy [S] of independent Gaussians with log_std [S, A, 1]."""
+    return log_std.sum((-1, -2)) + 0.5 * log_std.shape[-2] * (1 + LOG_2PI)
 
 
 @dataclass
@@ -100,25 +99,25 @@ class Learner:
         adam: Adam's state.
     """
 
-    def __init__(self, rows: Tensor, settings: PPO, adam: Adam | None = None) -> None:
-        """Take over parameters [S, P]; `adam` continues an earlier run."""
+    def __init__(self, rows: Tensor, settings: PPO, shape: Shape, adam: Adam | None = None) -> None:
+        """Take over parameters [S, P] of networks of `shape`; `adam` continues an earlier run."""
         self.rows = rows
         self.settings = settings
         self.adam = adam or Adam.zeros_like(rows)
-        self.network = layers(rows, settings.hidden_units, settings.towers)
+        self.network = layers(rows, shape)
         self.gradient = torch.zeros_like(rows)
-        self._gradients = layers(self.gradient, settings.hidden_units, settings.towers)
-        self._owned = owned(settings.towers).to(rows.dtype)
-        shape = (rows.shape[0] * settings.towers, settings.minibatch_size, settings.hidden_units)
-        self._hidden = rows.new_empty(shape), rows.new_empty(shape)
-        self._delta = rows.new_empty(shape)
+        self._gradients = layers(self.gradient, shape)
+        self._owned = owned(shape).to(rows.dtype)
+        buffer = (rows.shape[0] * shape.towers, settings.minibatch_size, shape.hidden)
+        self._hidden = rows.new_empty(buffer), rows.new_empty(buffer)
+        self._delta = rows.new_empty(buffer)
 
     @torch.inference_mode()
     def update(self, records: Tensor, shuffles: Tensor, learning_rate: float) -> None:
         """Run all epochs over the samples of a rollout.
 
         Args:
-            records: [S, N, 16], see `pack`.
+            records: [S, N, F + A + 4], see `pack`.
             shuffles: [S, epochs, N] int64, each seed's own orders of its samples.
             learning_rate: Adam's, for this rollout.
         """
@@ -128,7 +127,7 @@ class Learner:
         for epoch in range(shuffles.shape[1]):
             index = (shuffles[:, epoch] + offset).view(seeds, -1, batch).transpose(0, 1)
             shuffled = records.view(-1, width).index_select(0, index.reshape(-1))
-            epoch_samples = unpack(shuffled.view(-1, seeds, batch, width))
+            epoch_samples = unpack(shuffled.view(-1, seeds, batch, width), self.network.actions)
             if self.settings.advantage_normalisation == "minibatch":
                 epoch_samples = epoch_samples._replace(advantage=_normalise(epoch_samples.advantage))
             for minibatch in zip(*epoch_samples, strict=True):
@@ -138,7 +137,7 @@ class Learner:
 
     def differentiate(self, samples: Samples) -> None:
         """Write dL/dparameters of one minibatch [S, B] into `gradient`."""
-        net, (hidden1, hidden2), towers = self.network, self._hidden, self.settings.towers
+        net, (hidden1, hidden2), towers = self.network, self._hidden, self.network.towers
         features = to_towers(samples.features, towers)
         torch.bmm(features, net.first, out=hidden1).tanh_()
         torch.bmm(hidden1, net.second, out=hidden2).add_(net.second_bias).tanh_()
@@ -149,18 +148,18 @@ class Learner:
         self._backward(features, gradient)
 
     def _loss_gradient(self, samples: Samples, output: Tensor) -> Tensor:
-        """Write dL/dlog_std; return dL/doutput [S, 3, B], the action means and the value."""
+        """Write dL/dlog_std; return dL/doutput [S, A + 1, B], the action means and the value."""
         settings, log_std = self.settings, self.network.log_std
-        mean, value = output[:, :ACTION_SIZE], output[:, ACTION_SIZE]
+        mean, value = output[:, :-1], output[:, -1]
         inverse_std = torch.exp(-log_std)
         deviation = (samples.action - mean).mul_(inverse_std)
         log_prob = log_probability(deviation, log_std)
         d_log_prob = self._surrogate_gradient(log_prob, samples).mul_(-1 / value.shape[1])[:, None]
 
         gradient = torch.empty_like(output)
-        torch.mul(deviation, d_log_prob, out=gradient[:, :ACTION_SIZE]).mul_(inverse_std)
-        torch.sub(value, samples.target, out=gradient[:, ACTION_SIZE])
-        gradient[:, ACTION_SIZE].mul_(2 * settings.value_coefficient / value.shape[1])
+        torch.mul(deviation, d_log_prob, out=gradient[:, :-1]).mul_(inverse_std)
+        torch.sub(value, samples.target, out=gradient[:, -1])
+        gradient[:, -1].mul_(2 * settings.value_coefficient / value.shape[1])
         d_log_std = deviation.square_().sub_(1).mul_(d_log_prob).sum(-1, keepdim=True)
         torch.sub(d_log_std, settings.entropy_coefficient, out=self._gradients.log_std)
         return gradient
@@ -180,7 +179,7 @@ class Learner:
         return gradient if gradient.ndim == 2 else gradient.mean(1)
 
     def _backward(self, features: Tensor, output: Tensor) -> None:
-        """Propagate dL/doutput [S K, 3, B] to the layers; `delta` is dL/d(sum into a tanh)."""
+        """Propagate dL/doutput [S K, A + 1, B] to the layers; `delta` is dL/d(sum into a tanh)."""
         net, gradients, (hidden1, hidden2), delta = self.network, self._gradients, self._hidden, self._delta
         torch.bmm(output, hidden2, out=gradients.head)
         torch.sum(output, -1, keepdim=True, out=gradients.head_bias)
@@ -223,20 +222,20 @@ class Diagnostics(NamedTuple):
 
 @torch.inference_mode()
 def diagnose(network: Layers, records: Tensor, clip_range: float) -> Diagnostics:
-    """Measure the loss terms on records [S, N, 16].
+    """Measure the loss terms on records [S, N, F + A + 4].
 
     approx_kl is mean(rho - 1 - log rho), the low-variance estimator of KL(old, new) (Schulman 2020).
     """
-    samples = unpack(records)
+    samples = unpack(records, network.actions)
     output = forward(network, samples.features)
-    deviation = (samples.action - output[:, :ACTION_SIZE]) * torch.exp(-network.log_std)
+    deviation = (samples.action - output[:, :-1]) * torch.exp(-network.log_std)
     log_ratio = log_probability(deviation, network.log_std) - samples.log_prob
     ratio = log_ratio.exp()
     clipped = ratio.clamp(1 - clip_range, 1 + clip_range)
     surrogate = torch.minimum(ratio * samples.advantage, clipped * samples.advantage)
     return Diagnostics(
         policy_loss=-surrogate.mean(1),
-        value_loss=(output[:, ACTION_SIZE] - samples.target).square().mean(1),
+        value_loss=(output[:, -1] - samples.target).square().mean(1),
         approx_kl=(ratio - 1 - log_ratio).mean(1),
         clip_fraction=((ratio - 1).abs() > clip_range).float().mean(1),
         entropy=entropy(network.log_std),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS, OBSERVATION_SIZE, Lanes, control_cost, draw_reset
+from reacher_shaping.tasks.base import Lanes, Task, control_cost
 from reacher_shaping.training.policy import Policy
 
 Array = NDArray[np.float64]
@@ -24,15 +24,16 @@ Stack = TypeVar("Stack", NDArray[Any], Tensor)
 
 @dataclass(frozen=True)
 class Plan:
-    """How the `steps` of a rollout are laid out in lanes; only the last lane may be shorter than T."""
+    """How the `steps` of a rollout are laid out in lanes of T = `episode_steps`; only the last may be shorter."""
 
     steps: int
+    episode_steps: int
 
     @cached_property
     def lengths(self) -> NDArray[np.int64]:
         """[L] environment steps of each lane."""
-        full, rest = divmod(self.steps, EPISODE_STEPS)
-        return np.array([EPISODE_STEPS] * full + [rest] * (rest > 0))
+        full, rest = divmod(self.steps, self.episode_steps)
+        return np.array([self.episode_steps] * full + [rest] * (rest > 0))
 
     @property
     def lanes(self) -> int:
@@ -42,21 +43,21 @@ class Plan:
     @property
     def episodes(self) -> int:
         """Lanes that reach the time limit: the episodes a Monitor would log."""
-        return self.steps // EPISODE_STEPS
+        return self.steps // self.episode_steps
 
     @cached_property
     def ends(self) -> NDArray[np.bool_]:
         """[L, T] true at each lane's last step."""
-        return np.equal(np.arange(EPISODE_STEPS), self.lengths[:, None] - 1)
+        return np.equal(np.arange(self.episode_steps), self.lengths[:, None] - 1)
 
     @cached_property
     def order(self) -> NDArray[np.int64]:
         """[L, T] position of each step in the sequential rollout."""
-        return np.arange(self.lanes)[:, None] * EPISODE_STEPS + np.arange(EPISODE_STEPS)
+        return np.arange(self.lanes)[:, None] * self.episode_steps + np.arange(self.episode_steps)
 
     def sequence(self, values: Stack) -> Stack:
         """Return the steps the sequential loop takes, [S, N, ...] in its order, of values [S, L, T, ...]."""
-        return values.reshape(len(values), self.lanes * EPISODE_STEPS, *values.shape[3:])[:, : self.steps]
+        return values.reshape(len(values), self.lanes * self.episode_steps, *values.shape[3:])[:, : self.steps]
 
 
 @dataclass(frozen=True)
@@ -64,67 +65,64 @@ class Rollout:
     """What one rollout recorded; where the plan takes no step the numbers are to be ignored.
 
     Attributes:
-        observation: [S, L, T+1, 10], s_0 .. s_T.
-        distance: [S, L, T+1] m, tip to target.
-        action: [S, L, T, 2] torques as sampled (the loss sees these, also if clipped for the step).
-        control: [S, L, T] ||a||^2 of the torques applied.
+        observation: [S, L, T+1, F], s_0 .. s_T.
+        measured: [S, L, T+1, M], what the task measures in them.
+        action: [S, L, T, A] as sampled (the loss sees these, also if clipped for the step).
+        control: [S, L, T] ||a||^2 of the actions applied.
     """
 
     observation: Array
-    distance: Array
+    measured: Array
     action: NDArray[np.float32]
     control: NDArray[np.float32]
+
+    @property
+    def distance(self) -> Array:
+        """[S, L, T+1] m, to the goal."""
+        return self.measured[..., 0]
 
 
 class Collector:
     """Collects rollouts for S seeds; holds the lanes and the streams' keys."""
 
-    def __init__(self, seeds: Sequence[int], root_seed: int, plan: Plan, *, clip_actions: bool = False) -> None:
+    def __init__(
+        self, task: Task, seeds: Sequence[int], root_seed: int, plan: Plan, *, clip_actions: bool = False
+    ) -> None:
         """Allocate S x L lanes."""
+        self.task = task
         self.seeds = list(seeds)
         self.root_seed = root_seed
         self.plan = plan
         self.clip_actions = clip_actions
-        self.lanes = Lanes(len(self.seeds) * plan.lanes)
+        self.lanes = Lanes(task, len(self.seeds) * plan.lanes)
 
     def collect(self, policy: Policy, iteration: int) -> Rollout:
         """Run one rollout of `iteration` (counted from 0) with `policy` fixed."""
-        shape = (len(self.seeds), self.plan.lanes)
-        observation = np.empty((*shape, EPISODE_STEPS + 1, OBSERVATION_SIZE))
-        distance = np.empty((*shape, EPISODE_STEPS + 1))
-        action = np.empty((*shape, EPISODE_STEPS, ACTION_SIZE), dtype=np.float32)
+        task, shape, times = self.task, (len(self.seeds), self.plan.lanes), self.plan.episode_steps
+        observation = np.empty((*shape, times + 1, task.observation_size))
+        measured = np.empty((*shape, times + 1, len(task.measures)))
+        action = np.empty((*shape, times, task.action_size), dtype=np.float32)
         noise = self._noise(iteration)
         lanes = self.lanes
         lanes.reset(self.resets(iteration))
-        for t in range(EPISODE_STEPS):
+        for t in range(times):
             observation[:, :, t] = lanes.observation.reshape(*shape, -1)
-            distance[:, :, t] = lanes.distance.reshape(shape)
+            measured[:, :, t] = lanes.measured.reshape(*shape, -1)
             action[:, :, t] = policy.act(observation[:, :, t], noise[:, :, t])
-            lanes.step(self._applied(action[:, :, t]).reshape(-1, ACTION_SIZE))
+            lanes.step(self._applied(action[:, :, t]).reshape(-1, task.action_size))
         observation[:, :, -1] = lanes.observation.reshape(*shape, -1)
-        distance[:, :, -1] = lanes.distance.reshape(shape)
-        return Rollout(observation, distance, action, control_cost(self._applied(action)))
+        measured[:, :, -1] = lanes.measured.reshape(*shape, -1)
+        return Rollout(observation, measured, action, control_cost(self._applied(action)))
 
-    def resets(self, iteration: int) -> list[tuple[Array, Array]]:
-        """Return the start of each lane, seed by seed: (joint positions [4], joint velocities [4])."""
+    def resets(self, iteration: int) -> list[Array]:
+        """Return the reset of each lane [D], seed by seed."""
         generators = [stream(self.root_seed, Purpose.RESETS, seed, iteration) for seed in self.seeds]
-        return [draw_reset(generator) for generator in generators for _ in range(self.plan.lanes)]
+        return [self.task.draw_reset(generator) for generator in generators for _ in range(self.plan.lanes)]
 
     def _applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
         return action.clip(-1.0, 1.0) if self.clip_actions else action
 
     def _noise(self, iteration: int) -> NDArray[np.float32]:
-        shape = (self.plan.lanes, EPISODE_STEPS, ACTION_SIZE)
+        shape = (self.plan.lanes, self.plan.episode_steps, self.task.action_size)
         generators = [stream(self.root_seed, Purpose.ACTIONS, seed, iteration) for seed in self.seeds]
         return np.stack([generator.standard_normal(shape, dtype=np.float32) for generator in generators])
-
-
-def environment_reward(distance: Array, control: NDArray[np.floating], control_weight: float) -> Array:
-    """Return r [S, L, T] = -||tip - target|| - w ||a||^2 (paper, section 3.1).
-
-    Args:
-        distance: [S, L, T+1] m; the reward of a step reads the distance after it.
-        control: [S, L, T] ||a||^2, in the precision of the action: Gymnasium weighs it in that precision too.
-        control_weight: w; 0.1 in the paper's text, 1 in Gymnasium's code.
-    """
-    return -distance[..., 1:] - control_weight * control

@@ -17,10 +17,11 @@ from torch import Tensor
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.storage.block_schemas import MEASURES
-from reacher_shaping.tasks.reacher import ACTION_SIZE, EPISODE_STEPS
-from reacher_shaping.training import advantage, ppo, shaping
-from reacher_shaping.training.policy import Policy, forward, initialise, inputs
-from reacher_shaping.training.rollout import Collector, Plan, Rollout, environment_reward
+from reacher_shaping.tasks.base import Task, load_task
+from reacher_shaping.training import advantage, ppo
+from reacher_shaping.training.policy import Policy, Shape, forward, initialise, inputs
+from reacher_shaping.training.rollout import Collector, Plan, Rollout
+from reacher_shaping.training.shaping import Rule, State
 
 Array = NDArray[np.float64]
 Rows = dict[str, NDArray[Any]]
@@ -37,38 +38,50 @@ class TrainState:
 
     Attributes:
         seeds: run seeds of the block.
+        shape: sizes of a network.
         rows: [S, P] parameters.
         adam: Adam's state.
         progress: [S, I] of each of `MEASURES`, NaN from `iteration` on.
         episode_returns: [S, I, E] unshaped returns of the episodes that reached the time limit.
-        rollout_steps: environment steps of an iteration.
+        plan: how an iteration's environment steps lie in episodes.
+        schedule: the state of the shaping weight's schedule.
         unlogged: [S] shaped return of the last rollout's steps after its last whole episode.
         iteration: iterations done.
     """
 
     seeds: tuple[int, ...]
+    shape: Shape
     rows: Tensor
     adam: ppo.Adam
     progress: Rows
     episode_returns: Array
-    rollout_steps: int
+    plan: Plan
+    schedule: State
     unlogged: Array
     iteration: int = 0
 
     @classmethod
     def start(cls, cell: Cell, seeds: Sequence[int]) -> "TrainState":
         """Return the state before the first iteration."""
-        settings = cell.protocol.ppo
-        rows = initialise(seeds, cell.root_seed, settings)
-        shape = (len(seeds), cell.iterations)
-        progress = {name: np.full(shape, np.nan) for name in MEASURES}
-        returns = np.full((*shape, Plan(settings.rollout_steps).episodes), np.nan)
-        unlogged = np.zeros(len(seeds))
-        return cls(tuple(seeds), rows, ppo.Adam.zeros_like(rows), progress, returns, settings.rollout_steps, unlogged)
+        settings, task = cell.protocol.ppo, load_task(cell.protocol.environment.task)
+        shape, plan = Shape.of(task, settings), Plan(settings.rollout_steps, task.episode_steps)
+        rows = initialise(seeds, cell.root_seed, settings, shape)
+        logged = (len(seeds), cell.iterations)
+        return cls(
+            seeds=tuple(seeds),
+            shape=shape,
+            rows=rows,
+            adam=ppo.Adam.zeros_like(rows),
+            progress={name: np.full(logged, np.nan) for name in MEASURES},
+            episode_returns=np.full((*logged, plan.episodes), np.nan),
+            plan=plan,
+            schedule=Rule.of(cell).schedule.start(len(seeds)),
+            unlogged=np.zeros(len(seeds)),
+        )
 
-    def policy(self, cell: Cell) -> Policy:
+    def policy(self) -> Policy:
         """Return the policy as trained so far."""
-        return Policy(self.rows, cell.protocol.ppo.hidden_units, cell.protocol.ppo.towers)
+        return Policy(self.rows, self.shape)
 
     def diverged(self) -> list[int]:
         """Return the seeds whose parameters are no longer finite."""
@@ -82,7 +95,7 @@ class TrainState:
             {
                 "seed": np.repeat(self.seeds, self.iteration),
                 "iteration": iterations,
-                "env_steps": iterations * self.rollout_steps,
+                "env_steps": iterations * self.plan.steps,
                 **{name: values[:, : self.iteration].ravel() for name, values in self.progress.items()},
             }
         )
@@ -95,14 +108,14 @@ class TrainState:
         returns = self.episode_returns[:, : self.iteration]
         seeds, iterations, episodes = returns.shape
         iteration = np.tile(np.repeat(np.arange(iterations), episodes), seeds)
-        within = np.tile(EPISODE_STEPS * np.arange(1, episodes + 1), seeds * iterations)
+        within = np.tile(self.plan.episode_steps * np.arange(1, episodes + 1), seeds * iterations)
         return pd.DataFrame(
             {
                 "seed": np.repeat(self.seeds, iterations * episodes),
                 "iteration": iteration + 1,
                 "episode_return": returns.ravel(),
-                "episode_length": EPISODE_STEPS,
-                "env_steps": iteration * self.rollout_steps + within,
+                "episode_length": self.plan.episode_steps,
+                "env_steps": iteration * self.plan.steps + within,
             }
         )
 
@@ -119,14 +132,15 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
     A seed whose numbers stop being finite is carried on as such and touches no other.
     """
     settings = cell.protocol.ppo
-    plan = Plan(settings.rollout_steps)
+    task, rule = load_task(cell.protocol.environment.task), Rule.of(cell)
     state = state or TrainState.start(cell, seeds)
-    learner = ppo.Learner(state.rows, settings, state.adam)
-    collector = Collector(seeds, cell.root_seed, plan, clip_actions=cell.protocol.environment.clip_actions)
-    policy = state.policy(cell)
+    learner = ppo.Learner(state.rows, settings, state.shape, state.adam)
+    clip = cell.protocol.environment.clip_actions
+    collector = Collector(task, seeds, cell.root_seed, state.plan, clip_actions=clip)
+    policy = state.policy()
     while state.iteration < cell.iterations:
         rollout = collector.collect(policy, state.iteration)
-        records, summary = prepare(cell, policy, rollout, plan, state.iteration, radius)
+        records, summary = prepare(cell, task, rule, state, rollout, radius)
         rate = learning_rate(settings, state.iteration / cell.iterations)
         learner.update(records, _shuffles(cell, seeds, state.iteration), rate)
         losses = ppo.diagnose(learner.network, records, settings.clip_range)
@@ -134,6 +148,7 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
             **summary,
             "action_std": learner.network.log_std.exp().mean((1, 2)),
             **losses._asdict(),
+            "alpha": rule.alpha(state.schedule, state.iteration * state.plan.steps),
         }
         shaped, rest = measured.pop("shaped_returns"), measured.pop("rest")
         state.episode_returns[:, state.iteration] = measured.pop("episode_returns")
@@ -142,6 +157,7 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
         else:
             measured["logged_return"] = measured["episode_return"]
         state.unlogged = rest
+        state.schedule = rule.schedule.update(cell.variant, state.schedule, measured)
         for name, values in measured.items():
             state.progress[name][:, state.iteration] = values
         state.iteration += 1
@@ -160,10 +176,15 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
 
     Args:
         shaped: [S, E] shaped returns of the rollout's whole episodes.
+        schedule: the state of the shaping weight's schedule.
         unlogged: [S] shaped return of the rollout before, after its last whole episode. The running sum of an
             episode is not cleared where a rollout starts, so the first episode's contains it. With the paper's 40
             episodes a rollout the first is not among the last ten, so it never shows there.
+
+    Without a whole episode there is nothing to log: NaN.
     """
+    if not shaped.shape[1]:
+        return np.full(len(shaped), np.nan)
     logged = shaped.copy()
     logged[:, 0] += unlogged
     figure: Array = logged[:, -RELEASED_LOG_EPISODES:].mean(1)
@@ -171,26 +192,20 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
 
 
 def prepare(
-    cell: Cell, policy: Policy, rollout: Rollout, plan: Plan, iteration: int, radius: float
+    cell: Cell, task: Task, rule: Rule, state: TrainState, rollout: Rollout, radius: float
 ) -> tuple[Tensor, Rows]:
-    """Turn a rollout into sample records [S, N, 16] and the rollout's summary, [S] each.
+    """Turn a rollout into sample records [S, N, F + A + 4] and the rollout's summary, [S] each.
 
     Samples stand in the order of the sequential rollout. The summary also holds `episode_returns`
     [S, E], unshaped, `shaped_returns` [S, E], and `rest` [S], the shaped return of the steps after the last
     whole episode.
     """
-    settings = cell.protocol.ppo
-    reward = environment_reward(rollout.distance, rollout.control, cell.protocol.environment.control_weight)
-    extra = shaping.shaping_reward(
-        rollout.distance,
-        plan.order + iteration * plan.steps,
-        plan.ends,
-        variant=cell.variant,
-        alpha0=cell.alpha0,
-        discount=settings.discount,
-        settings=cell.protocol.shaping,
+    settings, plan, environment = cell.protocol.ppo, state.plan, cell.protocol.environment
+    reward = task.rewards["dense"](
+        rollout.measured[..., 1:, :], rollout.control, control_weight=environment.control_weight, success_radius=radius
     )
-    features, log_prob, values = _outputs(policy, rollout)
+    extra = rule.reward(rollout.distance, plan.order + state.iteration * plan.steps, plan.ends, state.schedule)
+    features, log_prob, values = _outputs(state.policy(), rollout)
     following = advantage.next_values(values, plan.ends, cell.protocol.shaping.episode_end)
     advantages = advantage.gae(
         reward + extra,
@@ -217,14 +232,14 @@ def prepare(
 
 @torch.inference_mode()
 def _outputs(policy: Policy, rollout: Rollout) -> tuple[Tensor, Tensor, Array]:
-    """Return inputs [S, L, T, 11], log-probabilities [S, L, T] and values [S, L, T+1] of a whole rollout."""
+    """Return inputs [S, L, T, F + 1], log-probabilities [S, L, T] and values [S, L, T+1] of a whole rollout."""
     seeds, lanes, times, _ = rollout.observation.shape
     features = inputs(rollout.observation)
     output = forward(policy.layers, features.view(seeds, lanes * times, -1)).view(seeds, -1, lanes, times)
-    mean, values = output[:, :ACTION_SIZE, :, :-1], output[:, ACTION_SIZE]
+    mean, values = output[:, :-1, :, :-1], output[:, -1]
     log_std = policy.layers.log_std
     action = torch.from_numpy(rollout.action).permute(0, 3, 1, 2)
-    deviation = ((action - mean) * torch.exp(-log_std)[..., None]).reshape(seeds, ACTION_SIZE, -1)
+    deviation = ((action - mean) * torch.exp(-log_std)[..., None]).reshape(*log_std.shape[:2], -1)
     log_prob = ppo.log_probability(deviation, log_std).view(seeds, lanes, -1)
     return features[:, :, :-1], log_prob, values.double().numpy()
 
@@ -241,7 +256,7 @@ def _summary(reward: Array, extra: Array, rollout: Rollout, plan: Plan, radius: 
         "shaped_returns": shaped[:, whole],
         "rest": shaped[:, plan.episodes :].sum(1),
         "shaped_return": shaped[:, whole].mean(1),
-        "episode_length": np.full(len(returns), float(EPISODE_STEPS)),
+        "episode_length": np.full(len(returns), float(plan.episode_steps)),
         "success_rate": (distance.min(-1) <= radius).mean(1),
         "final_distance": distance[..., -1].mean(1),
     }
