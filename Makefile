@@ -71,6 +71,7 @@ check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
 	ruff format --check
 	snakefmt --check Snakefile workflow
 	mypy
+	mypy --config-file tests/mypy.ini
 	python workflow/lint.py
 
 lock: $(READY) ## requirements.txt anew from the pins of pyproject.toml

@@ -33,7 +33,7 @@ def brings_gpu_packages(requirement: str) -> bool:
 
 def install_cpu_torch(requirement: str) -> bool:
     """Try to install PyTorch's CPU build with uv; return whether it is there."""
-    command = [sys.executable, "-m", "uv", "pip", "install", "--quiet", "--python", sys.executable]
+    command = [sys.executable, "-m", "uv", "pip", "install", "--no-config", "--quiet", "--python", sys.executable]
     return subprocess.run([*command, "--torch-backend", "cpu", requirement], check=False).returncode == 0
 
 
