@@ -1,8 +1,11 @@
 """The tracer on a small package with sub-packages: what an edit reruns, and what it does not."""
 
+import shutil
 import textwrap
+from pathlib import Path
 
 import pytest
+from cells import cell
 
 from reacher_shaping.storage import code_hash as tracer
 from reacher_shaping.storage.code_hash import code_hash, reachable_code, reached_files
@@ -142,3 +145,56 @@ def test_import_that_cannot_be_followed_is_refused(package, statement):
     (package.folder / "other.py").write_text(f"{statement}\n")
     with pytest.raises(ValueError, match=r"plane.*: write `from reacher_shaping\.\.\. import "):
         code_hash(package.folder / "other.py")
+
+
+@pytest.fixture
+def copied(tmp_path, monkeypatch):
+    """A copy of the package; gives a function that hashes the training of a variant's cells."""
+    shutil.copytree(tracer.FOLDER, tmp_path / "package", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(tracer, "FOLDER", tmp_path / "package")
+    script = Path(__file__).parents[2] / "workflow" / "scripts" / "train_block.py"
+
+    def hashes():
+        tracer._source.cache_clear()
+        return {name: code_hash(script, cell(name).chosen_code) for name in ("none", "l2", "l2sq", "decay")}
+
+    hashes.folder = tmp_path / "package"
+    yield hashes
+    tracer._source.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "changed"),
+    [
+        ("training/potentials.py", "\n\ndef l2sq", "\n\ndef exp(d):\n    return np.exp(-d)\n\n\ndef l2sq", set()),
+        ("training/schedules.py", "\n\nconstant = ", "\n\nhalf = _stateless(lambda v, t: t)\nconstant = ", set()),
+        ("tasks/other.py", "", "TASK = 1\n", set()),
+        ("training/potentials.py", "np.negative(np.square(distance))", "-distance * distance", {"l2sq"}),
+        ("training/schedules.py", "1.0 - env_steps", "2.0 - env_steps", {"decay"}),
+        ("tasks/reacher.py", "frame_skip=2", "frame_skip=3", {"none", "l2", "l2sq", "decay"}),
+    ],
+    ids=["potential_added", "schedule_added", "task_added", "potential", "schedule", "task"],
+)
+def test_a_cells_training_follows_its_own_potential_schedule_and_task(copied, file, old, new, changed):
+    before = copied()
+    path = copied.folder / file
+    text = path.read_text() if path.exists() else ""
+    assert old in text
+    path.write_text(text.replace(old, new) if old else new)
+    after = copied()
+    assert {name for name in before if before[name] != after[name]} == changed
+
+
+def test_the_names_that_settings_allow_are_those_of_the_code(copied):
+    assert tracer.defined_names("training.potentials") == ("none", "l2", "l2sq")
+    assert tracer.modules_defining("tasks", "TASK") == ("reacher",)
+    (copied.folder / "training/potentials.py").write_text("A = 1\n_B = 2\n\n\ndef c():\n    pass\n")
+    (copied.folder / "tasks/toy.py").write_text("TASK = 1\n")
+    tracer._source.cache_clear()
+    assert tracer.defined_names("training.potentials") == ("A", "c")
+    assert tracer.modules_defining("tasks", "TASK") == ("reacher", "toy")
+
+
+def test_a_chosen_name_that_is_not_defined_is_refused(package):
+    with pytest.raises(ValueError, match="numbers:nothing is not defined"):
+        code_hash(package.folder / "script.py", ("numbers:nothing",))

@@ -1,0 +1,129 @@
+"""Another task is one file, another schedule one record: a toy of each trains, and nothing else knows of it."""
+
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from toys import point_mass
+
+from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.jobs.checkpoint import load_checkpoint, save_checkpoint
+from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Shaping, Variant
+from reacher_shaping.storage import block_schemas
+from reacher_shaping.storage.files import write_table
+from reacher_shaping.tasks.base import Lanes
+from reacher_shaping.training import schedules
+from reacher_shaping.training.shaping import Schedule
+from reacher_shaping.training.train import train
+
+FALLING = Schedule(
+    start=lambda seeds: {"success": np.zeros(seeds)},
+    weight=lambda variant, state, env_steps: (1 - state["success"]).reshape(-1, *[1] * env_steps.ndim),
+    update=lambda variant, state, measured: {"success": 0.5 * state["success"] + 0.5 * measured["success_rate"]},
+)
+"""A weight that falls with a seed's own success."""
+
+
+@pytest.fixture(autouse=True)
+def toys(monkeypatch):
+    monkeypatch.setitem(sys.modules, "reacher_shaping.tasks.point_mass", point_mass)
+    monkeypatch.setattr(schedules, "falling", FALLING, raising=False)
+
+
+def toy_cell(*, task="reacher", schedule="constant", alpha0=1.0, iterations=4, **ppo):
+    """A cell; the names of toys are no allowed settings, so its parts are made without asking."""
+    environment = Environment.model_construct(task=task, control_weight=0.01, clip_actions=False)
+    settings = PPO(**{"rollout_steps": 192, "epochs": 2, "minibatch_size": 32, **ppo})
+    protocol = Protocol.model_construct(
+        name="toy", environment=environment, ppo=settings, shaping=Shaping(), log=Protocol(name="p").log
+    )
+    variant = Variant.model_construct(name="l2", potential="l2", schedule=schedule, horizon=None)
+    return Cell.model_construct(
+        protocol=protocol, variant=variant, budget=iterations * settings.rollout_steps, alpha0=alpha0, root_seed=7
+    )
+
+
+def trained(cell, seeds, state=None, iterations=None, radius=0.1):
+    for found in train(cell, seeds, radius=radius, state=state):
+        if found.iteration == iterations:
+            break
+    return found
+
+
+def test_lanes_of_the_toy_are_a_damped_mass_pushed_by_eulers_steps():
+    """The damping of 1 N s/m is taken at the end of a step, as MuJoCo's Euler integrator does."""
+    generator = np.random.default_rng(0)
+    draws = [point_mass.draw_reset(generator) for _ in range(5)]
+    place, goal = np.array(draws).T
+    speed = np.zeros(5)
+    lanes = Lanes(point_mass.TASK, 5)
+    lanes.reset(draws)
+    for _ in range(30):
+        force = generator.normal(size=(5, 1))
+        lanes.step(force)
+        for _ in range(2):
+            speed = (0.2 * speed + 0.05 * force[:, 0].clip(-1, 1)) / (0.2 + 0.05)
+            place = place + 0.05 * speed
+        np.testing.assert_allclose(lanes.observation, np.column_stack([place, speed, goal]), atol=1e-12)
+        np.testing.assert_allclose(lanes.distance, np.abs(place - goal), atol=1e-12)
+
+
+def test_the_toy_task_is_learned_and_evaluated():
+    settings = {"rollout_steps": 480, "epochs": 5, "minibatch_size": 60, "learning_rate": 3e-3, "discount": 0.9}
+    cell = toy_cell(task="point_mass", iterations=30, **settings)
+    state = trained(cell, [0, 1])
+    assert state.episode_returns.shape == (2, 30, 16)
+    assert (state.progress["episode_length"] == 30).all()
+    first, last = state.episode_returns[:, :4].mean((1, 2)), state.episode_returns[:, -4:].mean((1, 2))
+    assert (last > 0.6 * first).all(), "returns are negative"
+    rows = evaluate(
+        state.policy().act, [0, 1], mode="deterministic", episodes=50, radius=0.1,
+        environment=cell.protocol.environment, root_seed=1,
+    )  # fmt: skip
+    still = evaluate(
+        lambda observation, noise: np.zeros((*observation.shape[:2], 1)), [0], mode="deterministic", episodes=50,
+        radius=0.1, environment=cell.protocol.environment, root_seed=1,
+    )  # fmt: skip
+    assert rows["final_distance"].mean() < 0.5 * still["final_distance"].mean()
+
+
+def test_a_weight_with_a_state_falls_with_each_seeds_own_success_and_is_logged(tmp_path):
+    state = trained(toy_cell(schedule="falling", alpha0=3.0), [0, 1], radius=0.15)
+    success, alpha = state.progress["success_rate"], state.progress["alpha"]
+    average = np.zeros(2)
+    for iteration in range(state.iteration):
+        np.testing.assert_allclose(alpha[:, iteration], 3 * (1 - average))
+        average = 0.5 * average + 0.5 * success[:, iteration]
+    assert len(set(alpha[:, -1])) == 2, "the seeds must have fared differently"
+    frame = state.progress_frame()
+    assert frame.columns[-1] == "alpha"
+    write_table(tmp_path / "progress.parquet", frame, block_schemas.PROGRESS)
+
+
+def test_a_weight_with_a_state_shapes_with_what_it_was_in_the_iteration():
+    """Shaped less unshaped return is the weight's multiple of what a constant weight of 1 would add."""
+    state = trained(toy_cell(schedule="falling", alpha0=3.0), [0, 1], radius=0.15, iterations=1)
+    constant = trained(toy_cell(alpha0=1.0), [0, 1], radius=0.15, iterations=1)
+    added, expected = (
+        found.progress["shaped_return"][:, 0] - found.progress["episode_return"][:, 0] for found in (state, constant)
+    )
+    np.testing.assert_allclose(added, 3 * expected, rtol=1e-9)
+
+
+def test_a_seeds_weight_is_the_same_in_every_block():
+    both, alone = (trained(toy_cell(schedule="falling"), seeds, radius=0.15) for seeds in ([0, 1], [1]))
+    assert torch.equal(both.rows[1], alone.rows[0])
+    np.testing.assert_array_equal(both.progress["alpha"][1], alone.progress["alpha"][0])
+
+
+def test_the_state_of_a_weight_survives_a_checkpoint(tmp_path):
+    cell = toy_cell(schedule="falling", iterations=5)
+    whole = trained(cell, [0, 1], radius=0.15)
+    path = tmp_path / "key" / "checkpoint.pt"
+    save_checkpoint(path, trained(cell, [0, 1], radius=0.15, iterations=2))
+    kept, _ = load_checkpoint(path)
+    resumed = trained(cell, [0, 1], state=kept, radius=0.15)
+    assert torch.equal(resumed.rows, whole.rows)
+    pd.testing.assert_frame_equal(resumed.progress_frame(), whole.progress_frame(), check_exact=True)
