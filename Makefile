@@ -11,7 +11,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare archive verify reference test check lock bench peers clean
+.PHONY: help setup reproduce quick report compare archive verify reference test test-fast check lock bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -65,6 +65,9 @@ reference: $(READY) ## make the run in results/ the reference run: report/refere
 
 test: $(READY) ## the tests
 	python -m pytest
+
+test-fast: $(READY) ## the tests that take no seconds, in under a minute
+	python -m pytest -m "not slow"
 
 check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
 	ruff check

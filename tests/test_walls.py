@@ -1,67 +1,11 @@
 """The walls between the package's rooms: imports run down only, and what a room must not know stays out of it."""
 
-import ast
-from collections.abc import Iterator
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "src" / "reacher_shaping"
-FLOORS = [
-    "cli",
-    "report",
-    "figures",
-    "analysis",
-    "jobs",
-    "evaluation",
-    "training",
-    "tasks",
-    "settings",
-    "storage",
-    "ground",
-]
-"""The rooms from top to bottom; `ground` are the modules that stand in no folder."""
-MODULES = {
-    ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
-    for path in sorted(PACKAGE.rglob("*.py"))
-    if path.name != "__init__.py"
-}
-
-
-def imports(path: Path) -> Iterator[tuple[str, str]]:
-    """(module, name) of each import of a file; the name is empty where a module is imported whole."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield from ((node.module or "", alias.name) for alias in node.names)
-
-
-def inner_imports(path: Path) -> set[str]:
-    """Modules of the package that a file imports, by their names below it."""
-    found = set()
-    for module, name in imports(path):
-        if module.split(".")[0] == "reacher_shaping":
-            inner = module.removeprefix("reacher_shaping").removeprefix(".")
-            whole = f"{inner}.{name}".strip(".")
-            found.add(whole if whole in MODULES else inner)
-    return found & MODULES.keys()
-
-
-def outer_imports(path: Path) -> set[str]:
-    """Top-level names of what else a file imports."""
-    return {module.split(".")[0] for module, _ in imports(path)} - {"reacher_shaping"}
-
+from rooms import FLOORS, MODULES, PAGE, inner_imports, outer_imports, room, with_drawing
 
 IMPORTS = {name: inner_imports(path) for name, path in MODULES.items()}
-
-
-def room(module: str) -> str:
-    if module == "cli":
-        return "cli"
-    return module.split(".")[0] if "." in module else "ground"
 
 
 def in_room(*rooms: str) -> list[str]:
@@ -107,3 +51,8 @@ def test_what_is_shown_is_computed_elsewhere(module):
 @pytest.mark.parametrize("module", MODULES)
 def test_package_does_not_know_snakemake(module):
     assert "snakemake" not in outer_imports(MODULES[module])
+
+
+def test_drawing_of_the_rooms_is_that_of_the_code():
+    page = PAGE.read_text(encoding="utf-8")
+    assert page == with_drawing(page), "run `python workflow/rooms.py`"

@@ -13,6 +13,8 @@ from cells import small
 from mujoco.batch import Batch
 from torch.utils.flop_counter import FlopCounterMode
 
+pytestmark = pytest.mark.slow
+
 CLOCK_OFF = "+ profiling clock off"
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 

@@ -12,6 +12,8 @@ from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.training.policy import Policy
 
+pytestmark = pytest.mark.slow
+
 ROOT, WEIGHT, RADIUS = 5, 0.1, 0.05
 SETTINGS = {"radius": RADIUS, "environment": Environment(control_weight=WEIGHT), "root_seed": ROOT}
 

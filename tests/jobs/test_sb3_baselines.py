@@ -18,6 +18,8 @@ from reacher_shaping.settings.study import Evaluation
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_json, read_table, write_table
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "report" / "reference"
 EVALUATION = Evaluation(episodes=4, radius=0.05)

@@ -24,6 +24,8 @@ from reacher_shaping.storage.files import ArtifactError, read_table, write_table
 from reacher_shaping.storage.policy_format import write_policy
 from reacher_shaping.training.train import train
 
+pytestmark = pytest.mark.slow
+
 DEFAULT = yaml.safe_load((Path(__file__).parents[2] / "config.yaml").read_text())
 NASTY = st.sampled_from(
     [
