@@ -2,6 +2,7 @@ from pathlib import Path
 
 from snakemake.utils import min_version
 
+from reacher_shaping.settings.overview import overview
 from reacher_shaping.settings.study import settings_hash
 
 min_version("9.0")
@@ -63,3 +64,7 @@ for name in EXPERIMENTS:
             tables_of(name),
             f"results/experiments/{name}/check.txt",
             figures_of(name),
+
+
+if workflow.output_settings.stdout and not workflow.output_settings.quiet:  # a dry run, whose words go there
+    print(overview(STUDY))

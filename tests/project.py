@@ -13,6 +13,8 @@ from typing import Any
 
 import yaml
 
+from reacher_shaping.settings.study import read_settings
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -25,7 +27,7 @@ class Project:
             place, ignored = ROOT / name, shutil.ignore_patterns("__pycache__", "*.egg-info", "report.html")
             copy = shutil.copytree if place.is_dir() else shutil.copy
             copy(place, folder / name, **({"ignore": ignored} if place.is_dir() else {}))
-        config = yaml.safe_load((folder / "config.yaml").read_text()) | changes
+        config = read_settings(folder / "config.yaml") | changes
         (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
 
     def copied(self, folder: Path) -> "Project":
@@ -77,7 +79,7 @@ class Project:
 
     @contextmanager
     def configured(self, **changes) -> Iterator[None]:
-        config = yaml.safe_load((self.folder / "config.yaml").read_text()) | changes
+        config = read_settings(self.folder / "config.yaml") | changes
         with self.replaced("config.yaml", yaml.safe_dump(config, sort_keys=False)):
             yield
 

@@ -6,7 +6,7 @@ import synthetic
 
 from reacher_shaping.analysis.baselines import AGREEMENT_METRICS
 from reacher_shaping.settings.cell import Protocol
-from reacher_shaping.settings.study import Switches
+from reacher_shaping.settings.parts import Switches
 
 SWITCHES = Switches(
     start="paper", end="late", settings={"a": ("ppo.epochs",), "b": ("ppo.discount",)}, variants=("none",), budget=4096

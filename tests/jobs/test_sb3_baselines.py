@@ -14,7 +14,7 @@ from cells import cell
 
 from reacher_shaping.jobs import progress, sb3_baselines
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_json, read_table, write_table
 

@@ -10,7 +10,8 @@ import pytest
 from reacher_shaping.jobs import search
 from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.cell import PPO, Environment, Protocol, Variant
-from reacher_shaping.settings.study import Search, load_study
+from reacher_shaping.settings.search import Search
+from reacher_shaping.settings.study import load_study
 
 ROOT = Path(__file__).parents[2]
 L2 = Variant(name="l2", potential="l2")

@@ -206,8 +206,8 @@ def test_diverged_runs_are_counted_everywhere(inputs):
 
 
 def test_setup_is_read_from_the_configuration(page, study, inputs):
-    assert ["ppo: learning rate", "0.0003"] in page.rows
-    changed = {**study, "evaluation": {"episodes": 1234, "radius": 0.03}}
+    assert ["ppo: learning rate", "0.0003 (paper 3.2)"] in page.rows
+    changed = {**study, "evaluation": {"episodes": 1234, "radius": 0.03}, "sources": {}}
     changed["protocols"] = {"paper": study["protocols"]["paper"] | {"ppo": {"learning_rate": 0.5}}}
     other = Page(html.build(_changed(inputs, study=changed)))
     assert ["ppo: learning rate", "0.5"] in other.rows

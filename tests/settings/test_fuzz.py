@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-import yaml
 from cells import fresh_policy, small
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -18,7 +17,7 @@ from reacher_shaping.evaluation.policies import load_policies
 from reacher_shaping.jobs import training_job
 from reacher_shaping.jobs.checkpoint import save_checkpoint
 from reacher_shaping.settings.base import ConfigError
-from reacher_shaping.settings.study import Study, load_study
+from reacher_shaping.settings.study import Study, load_study, read_settings
 from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import ArtifactError, read_table, write_table
 from reacher_shaping.storage.policy_format import write_policy
@@ -26,7 +25,7 @@ from reacher_shaping.training.train import train
 
 pytestmark = pytest.mark.slow
 
-DEFAULT = yaml.safe_load((Path(__file__).parents[2] / "config.yaml").read_text())
+DEFAULT = read_settings(Path(__file__).parents[2] / "config.yaml")
 NASTY = st.sampled_from(
     [
         "",

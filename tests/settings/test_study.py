@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -15,7 +14,7 @@ from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Shap
 from reacher_shaping.settings.study import block_name, load_study, read_settings
 
 ROOT = Path(__file__).parents[2]
-DEFAULT = yaml.safe_load((ROOT / "config.yaml").read_text())
+DEFAULT = read_settings(ROOT / "config.yaml")
 
 
 def changed(path, value):

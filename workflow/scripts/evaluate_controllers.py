@@ -8,7 +8,7 @@ from job import logged
 
 from reacher_shaping.evaluation.controllers import evaluate_controllers
 from reacher_shaping.settings.cell import Protocol
-from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import write_table
 

@@ -5,7 +5,7 @@ from job import logged
 
 from reacher_shaping.evaluation.episode_lengths import evaluate_lengths
 from reacher_shaping.settings.cell import Environment
-from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import write_table
 from reacher_shaping.storage.policy_format import read_policy

@@ -6,7 +6,7 @@ from job import logged
 
 from reacher_shaping.analysis import switch_effects
 from reacher_shaping.settings.cell import Protocol
-from reacher_shaping.settings.study import Switches
+from reacher_shaping.settings.parts import Switches
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table, write_table
 

@@ -10,7 +10,8 @@ from job import logged
 from reacher_shaping.jobs import search
 from reacher_shaping.jobs.progress import Meter
 from reacher_shaping.settings.cell import Protocol, Variant
-from reacher_shaping.settings.study import Evaluation, Search
+from reacher_shaping.settings.parts import Evaluation
+from reacher_shaping.settings.search import Search
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table, write_table
 

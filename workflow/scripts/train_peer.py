@@ -7,7 +7,7 @@ from job import logged
 
 from reacher_shaping.jobs import sb3_baselines
 from reacher_shaping.settings.cell import Protocol
-from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.code_hash import reached_files
 from reacher_shaping.storage.files import write_json, write_table

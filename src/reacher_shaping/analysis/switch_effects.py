@@ -25,7 +25,7 @@ from reacher_shaping.analysis.correlation import CORRELATED, correlations, in_ta
 from reacher_shaping.labels import KEY
 from reacher_shaping.random_streams import generator
 from reacher_shaping.settings.cell import Protocol
-from reacher_shaping.settings.study import Switches
+from reacher_shaping.settings.parts import Switches
 
 EFFECT_METRICS = ("success_rate", "final_success_rate", "unit_return", "final_distance")
 

@@ -18,7 +18,7 @@ from reacher_shaping.evaluation.evaluate import Actor, evaluate
 from reacher_shaping.evaluation.metrics import evaluation_metrics
 from reacher_shaping.jobs.progress import Meter
 from reacher_shaping.settings.cell import Protocol
-from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.tasks.base import load_task
 
 Report = Callable[[str], None]

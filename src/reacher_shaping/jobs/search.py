@@ -13,7 +13,7 @@ import pandas as pd
 
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.settings.study import Search
+from reacher_shaping.settings.search import Search
 from reacher_shaping.training.train import train
 
 Values = dict[str, Any]

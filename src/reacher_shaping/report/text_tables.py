@@ -38,19 +38,27 @@ def to_markdown(grid: Grid) -> str:
 
 
 def settings_grid(study: Mapping[str, Any], protocols: Collection[str] | None = None) -> Grid:
-    """Settings of each protocol side by side: a row per setting, a column per protocol, of those named if any are."""
+    """Settings and their sources: a row per setting, a column per protocol, of those named if any are."""
     every = study.get("protocols", {})
+    sources = study.get("sources", {})
     shown = {name: settings for name, settings in every.items() if not protocols or name in protocols}
     flat = {name: _flatten({k: v for k, v in settings.items() if k != "name"}) for name, settings in shown.items()}
     keys = list(dict.fromkeys(key for settings in flat.values() for key in settings))
-    rows = [[key, *(plain(settings.get(key, "")) for settings in flat.values())] for key in keys]
+    rows = []
+    for key in keys:
+        texts = []
+        for name, settings in flat.items():
+            source = sources.get(f"protocols.{name}.{key.replace(': ', '.').replace(' ', '_')}")
+            texts.append(plain(settings.get(key, "")) + (f" ({source})" if source else ""))
+        rows.append([key, *texts])
     return Grid([say("tables.setting"), *(name.replace("_", " ") for name in flat)], rows)
 
 
 def departures_grid(study: Mapping[str, Any]) -> Grid:
     """Settings in which the protocols differ, side by side."""
-    grid = settings_grid(study)
-    return Grid(grid.headings, [row for row in grid.rows if len(set(row[1:])) > 1])
+    values, grid = settings_grid({**study, "sources": {}}), settings_grid(study)
+    rows = [row for value, row in zip(values.rows, grid.rows, strict=True) if len(set(value[1:])) > 1]
+    return Grid(grid.headings, rows)
 
 
 def _flatten(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

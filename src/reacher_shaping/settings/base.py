@@ -18,9 +18,9 @@ def _whole(value: Any) -> Any:
     return int(value) if whole else value
 
 
-Whole = Annotated[int, BeforeValidator(_whole)]
-Count = Annotated[Whole, Field(ge=1, le=10**12)]
-Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
+WHOLE = BeforeValidator(_whole)
+Count = Annotated[int, Field(ge=1, le=10**12), WHOLE]
+Seed = Annotated[int, Field(ge=0, lt=2**63), WHOLE]
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -33,7 +33,9 @@ class ConfigError(ValueError):
 class Settings(BaseModel):
     """Base of all settings: immutable, no unknown keys, no silent conversion of types, only finite numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -75,8 +77,8 @@ def _allowed(message: str, bounds: Mapping[str, Any]) -> str:
 
 
 def short(value: Any) -> str:
-    """A value as Python writes it, in at most 80 characters of one line."""
-    text = flat(repr(value))
+    """A value as Python writes it, in at most 80 characters of one line; a tuple as the list that was given."""
+    text = flat(repr(list(value) if isinstance(value, tuple) else value))
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 

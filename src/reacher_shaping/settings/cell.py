@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from reacher_shaping.settings.base import Count, Fraction, Name, NonNegative, Positive, Seed, Settings, Whole, plain
+from reacher_shaping.settings.base import WHOLE, Count, Fraction, Name, NonNegative, Positive, Seed, Settings, plain
 from reacher_shaping.storage.code_hash import defined_names, modules_defining
 
 Alpha0 = Annotated[float, Field(ge=1e-6, le=1e6)]
@@ -31,31 +31,52 @@ class Environment(Settings):
     """The task, the weight of its control cost, and whether actions are clipped to [-1, 1]."""
 
     task: TaskName = Field("reacher", exclude_if=lambda task: task == "reacher")
+    """What is simulated, observed and rewarded; a file of `tasks/`."""
     control_weight: NonNegative = 0.1
+    """Reward taken per squared unit of action."""
     clip_actions: bool = False
+    """Whether actions are clipped to [-1, 1] before they are applied and charged."""
 
 
 class PPO(Settings):
     """Proximal policy optimisation (Schulman et al. 2017); the defaults are the paper's, as in config.yaml."""
 
     learning_rate: Positive = 3e-4
+    """Step size of Adam."""
     learning_rate_schedule: Literal["constant", "linear"] = "constant"
+    """`linear` goes down to 0 at the end of the budget."""
     discount: Annotated[float, Field(gt=0, le=1)] = 0.99
+    """Gamma, per environment step."""
     gae_lambda: Fraction = 0.95
+    """Lambda of generalised advantage estimation."""
     clip_range: Positive = 0.2
+    """How far the probability ratio may be from 1 before it is clipped."""
     ratio_pairs: Literal["sample", "minibatch"] = "sample"
+    """Ratios of new and old probability of the same `sample`, or of all pairs of a `minibatch`."""
     advantage_normalisation: Literal["rollout", "minibatch"] = "rollout"
+    """Advantages to mean 0 and deviation 1 over a rollout, or again in every minibatch."""
     minibatch_size: Count = 64
-    rollout_steps: Annotated[Whole, Field(ge=2, le=10**6)] = 2048
-    epochs: Annotated[Whole, Field(ge=1, le=1000)] = 10
+    """Environment steps of a minibatch; divides `rollout_steps`."""
+    rollout_steps: Annotated[int, Field(ge=2, le=10**6), WHOLE] = 2048
+    """Environment steps of an iteration, after a fresh reset; 2048 are 40 episodes of 50 and one of 48."""
+    epochs: Annotated[int, Field(ge=1, le=1000), WHOLE] = 10
+    """Passes over a rollout."""
     value_coefficient: NonNegative = 0.5
+    """Weight of the squared value error in the loss."""
     entropy_coefficient: NonNegative = 0.01
+    """Weight of the entropy bonus."""
     max_gradient_norm: Positive = 0.5
+    """Greatest norm of the gradient over all parameters of a run."""
     adam_epsilon: Positive = 1e-8
-    hidden_units: Annotated[Whole, Field(ge=1, le=4096)] = 64
+    """Added to Adam's denominator."""
+    hidden_units: Annotated[int, Field(ge=1, le=4096), WHOLE] = 64
+    """Units of each of two Tanh layers."""
     networks: Literal["shared", "separate"] = "shared"
+    """One trunk `shared` by policy and value, or one each: `separate`."""
     initialisation: Literal["default", "orthogonal"] = "default"
+    """First weights: PyTorch's `default`, or `orthogonal`."""
     initial_log_std: float = 0.0
+    """Logarithm of the torques' standard deviation at the start."""
 
     @property
     def towers(self) -> int:
@@ -78,16 +99,22 @@ class Shaping(Settings):
     """How the shaping reward is formed, and what holds at the last step of an episode."""
 
     form: Literal["paper", "dynamic"] = "paper"
+    """`paper`: alpha(t) (gamma Phi(s') - Phi(s)); `dynamic`: with the weight inside the difference."""
     episode_end: Literal["terminal", "bootstrap"] = "terminal"
+    """The value after an episode's last step: 0 (`terminal`), or the critic's (`bootstrap`)."""
     terminal_potential: Literal["keep", "zero"] = "keep"
+    """The potential after an episode's last step, kept or zero."""
     decay_potential: Literal["variant", "l2sq"] = "variant"
+    """Of a variant whose weight decays: the variant's own, or `l2sq` whatever it says."""
     alpha0: Literal["weight", "label"] = "weight"
+    """The start weight is alpha0 (`weight`), or 1 whatever its label says (`label`)."""
 
 
 class Log(Settings):
     """What the protocol's own training log shows, in the column `logged_return`; nothing learns from it."""
 
     episode_return: Literal["unshaped", "released"] = "unshaped"
+    """Mean over a rollout's episodes (`unshaped`), or as the released code logs it (`released`)."""
 
 
 class Protocol(Settings):
@@ -95,9 +122,13 @@ class Protocol(Settings):
 
     name: Name
     environment: Environment = Environment()
+    """What surrounds the simulation."""
     ppo: PPO = PPO()
+    """The algorithm."""
     shaping: Shaping = Shaping()
+    """The shaping reward."""
     log: Log = Log()
+    """The protocol's own training log."""
 
 
 class Variant(Settings):
@@ -105,8 +136,11 @@ class Variant(Settings):
 
     name: Name
     potential: PotentialName
+    """Phi, a function of the goal distance in m."""
     schedule: ScheduleName = "constant"
+    """The weight stays, or goes down in a line to 0 at `horizon`."""
     horizon: Count | None = None
+    """Environment steps until a linear schedule is at 0."""
 
     @model_validator(mode="after")
     def _schedule_is_complete(self) -> Self:

@@ -12,34 +12,25 @@ from collections.abc import Mapping
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from reacher_shaping.settings.base import (
+    WHOLE,
     ConfigError,
-    Count,
     Name,
-    Positive,
     Seed,
     Settings,
-    Whole,
     first_problem,
     flat,
     short,
 )
-from reacher_shaping.settings.cell import Alpha0, Cell, Protocol, Variant
+from reacher_shaping.settings.cell import Cell, Protocol, Variant
+from reacher_shaping.settings.inheritance import resolved
+from reacher_shaping.settings.parts import Evaluation, Experiment, Peers, Row, Rows, Switches
+from reacher_shaping.settings.search import Search
 from reacher_shaping.settings.yaml_file import merged, read_mapping
-
-RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
-
-
-class Evaluation(Settings):
-    """Evaluation of every trained policy: episodes a run and mode; `radius` of success in m."""
-
-    episodes: Annotated[Whole, Field(ge=1, le=10**6)] = 1000
-    radius: Positive = 0.02
-
 
 PEER_PPO: dict[str, Any] = {
     "learning_rate_schedule": "constant",
@@ -52,143 +43,7 @@ PEER_PPO: dict[str, Any] = {
     "initial_log_std": 0.0,
 }
 """What Stable-Baselines3's PPO has for the settings that are not handed over to it (`sb3_baselines.train`)."""
-
-
-class Peers(Settings):
-    """The optional comparison with Stable-Baselines3: environment steps of each algorithm, and runs of each."""
-
-    seeds: Annotated[Whole, Field(ge=1, le=1000)] = 3
-    budgets: Annotated[
-        dict[Literal["ppo", "sac", "td3"], Annotated[Whole, Field(ge=100, le=10**9)]], Field(min_length=1)
-    ]
-
-
-class Row(Settings):
-    """One row of the grid: every variant x budget x alpha0, with optional changes to the protocol's settings."""
-
-    protocol: Name = "paper"
-    variants: Annotated[tuple[Name, ...], Field(min_length=1)]
-    budgets: Annotated[tuple[Count, ...], Field(min_length=1)]
-    alpha0: Annotated[tuple[Alpha0, ...], Field(min_length=1)] = (1.0,)
-    environment: dict[str, Any] = Field(default_factory=dict)
-    ppo: dict[str, Any] = Field(default_factory=dict)
-    shaping: dict[str, Any] = Field(default_factory=dict)
-    log: dict[str, Any] = Field(default_factory=dict)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _lists_to_tuples(cls, data: Any) -> Any:
-        return {key: _to_tuple(value) for key, value in data.items()} if isinstance(data, Mapping) else data
-
-
-def _to_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-Rows = Annotated[tuple[Row, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
-Names = Annotated[tuple[Name, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
-
-
-class Switches(Settings):
-    """What each difference between two protocols does: cells of both ends, of each switch alone, and of all but it.
-
-    `settings` maps a switch to the settings it stands for, such as `ppo.learning_rate`; `budget` is in environment
-    steps; without `alone` the cells of each switch alone are left out.
-    """
-
-    start: Name
-    end: Name
-    settings: Annotated[
-        dict[Name, Annotated[tuple[str, ...], BeforeValidator(_to_tuple), Field(min_length=1)]], Field(min_length=1)
-    ]
-    variants: Names
-    budget: Count
-    alpha0: Alpha0 = 1.0
-    alone: bool = True
-
-
-class Experiment(Settings):
-    """A further study beside the main one, a target of its name: runs per cell, cells, and perhaps peers."""
-
-    seeds: Annotated[Whole, Field(ge=1, le=10**5)]
-    grid: Annotated[tuple[Row, ...], BeforeValidator(_to_tuple)] = ()
-    switches: Switches | None = None
-    peers: Peers | None = None
-
-    @model_validator(mode="after")
-    def _there_are_cells(self) -> Self:
-        if not self.grid and self.switches is None:
-            raise ValueError("grid is missing; allowed: a grid, switches, or both")
-        return self
-
-
-class Range(Settings):
-    """Numbers from `low` to `high` to search, whole ones if both are; evenly, or evenly in their logarithm."""
-
-    low: float | int
-    high: float | int
-    log: bool = False
-
-    @model_validator(mode="after")
-    def _is_a_range(self) -> Self:
-        if not self.low < self.high or (self.log and self.low <= 0):
-            raise ValueError(f"low = {self.low}, high = {self.high}: no range; allowed: low < high, and 0 < low if log")
-        return self
-
-
-class Choices(Settings):
-    """Numbers to choose from."""
-
-    choices: Annotated[tuple[float | int, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
-
-
-class Search(Settings):
-    """The search for a protocol's settings: `trials` of `seeds` runs each, under a root seed of their own.
-
-    `fixed` and `space` map settings such as `ppo.discount`, or `alpha0`, to what they are in every trial and to what is
-    tried; the others are those of `protocol`. `budget` is in environment steps.
-    """
-
-    protocol: Name
-    variant: Name
-    budget: Count
-    seeds: Annotated[Whole, Field(ge=1, le=1000)]
-    root_seed: Seed
-    trials: Annotated[Whole, Field(ge=1, le=10**5)]
-    fixed: dict[str, bool | int | float | str] = Field(default_factory=dict)
-    space: Annotated[dict[str, Range | Choices], Field(min_length=1)]
-
-    def corners(self) -> list[dict[str, Any]]:
-        """The settings at the lower and at the upper end of the whole space."""
-        ends = {
-            path: (own.choices[0], own.choices[-1]) if isinstance(own, Choices) else (own.low, own.high)
-            for path, own in self.space.items()
-        }
-        return [{path: pair[end] for path, pair in ends.items()} for end in (0, 1)]
-
-    def cell(self, protocol: Protocol, variant: Variant, values: Mapping[str, Any]) -> Cell:
-        """The cell that a trial trains: `protocol` and alpha0 = 1 but for what is fixed and for `values`.
-
-        Raises ConfigError where they make no cell.
-        """
-        settings = {**self.fixed, **values}
-        changed = protocol.model_dump()
-        for path, value in settings.items():
-            part, _, key = path.partition(".")
-            if path != "alpha0" and (not isinstance(changed.get(part), Mapping) or key not in changed[part]):
-                raise ConfigError(f"search: {path!r} is no setting; allowed: alpha0, or such as 'ppo.discount'")
-            if key:
-                changed[part][key] = value
-        try:
-            return Cell(
-                protocol=Protocol.model_validate(changed),
-                variant=variant,
-                budget=self.budget,
-                alpha0=settings.get("alpha0", 1.0),
-                root_seed=self.root_seed,
-            )
-        except ValidationError as error:
-            raise ConfigError(f"search: a trial with {settings}: {first_problem(error)}") from None
+RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
 
 
 def _named(entries: Any) -> Any:
@@ -205,15 +60,36 @@ class Study(Settings):
     """All cells of a configuration, and how they are trained, evaluated and shown."""
 
     root_seed: Seed
-    seeds: Annotated[Whole, Field(ge=1, le=10**5)]
-    seeds_per_block: Annotated[Whole, Field(ge=1, le=1000)]
-    protocols: Annotated[dict[Name, Protocol], BeforeValidator(_named), Field(min_length=1)]
-    variants: Annotated[dict[Name, Variant], BeforeValidator(_named), Field(min_length=1)]
+    """Root of every random stream."""
+    seeds: Annotated[int, Field(ge=1, le=10**5), WHOLE]
+    """Runs of each cell of the main study."""
+    seeds_per_block: Annotated[int, Field(ge=1, le=1000), WHOLE]
+    """Runs that are trained together in one job."""
+    title: str = ""
+    """Heading of the main study in the report."""
+    question: str = ""
+    """What the main study asks."""
+    protocols: Annotated[dict[Name, Protocol], Field(min_length=1), BeforeValidator(_named)]
+    """Named, complete sets of environment and algorithm choices."""
+    variants: Annotated[dict[Name, Variant], Field(min_length=1), BeforeValidator(_named)]
+    """Shaping rules."""
     grid: Rows
+    """Rows of cells of the main study."""
     evaluation: Evaluation
+    """How every trained policy is evaluated."""
     peers: Peers
+    """Stable-Baselines3's algorithms without shaping, an optional target."""
     experiments: dict[Name, Experiment] = Field(default_factory=dict)
+    """Further studies, each a target of its name."""
     search: Search | None = None
+    """The search for a protocol's settings, an optional target."""
+    sources: dict[str, str] = Field(default_factory=dict)
+    """Where each value is from, by its place such as `protocols.paper.ppo.discount`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _resolve(cls, data: Any) -> Any:
+        return resolved(data) if isinstance(data, Mapping) else data
 
     @model_validator(mode="after")
     def _grid_is_possible(self) -> Self:
@@ -373,8 +249,10 @@ def block_name(seeds: range) -> str:
 
 
 def settings_hash(study: Study) -> str:
-    """Return the SHA-256 of all settings of a study, as hexadecimal text."""
-    settings = json.dumps(study.model_dump(mode="json"), sort_keys=True)
+    """Return the SHA-256 of all settings of a study, as hexadecimal text; its words and sources do not count."""
+    words: Any = {"title": True, "question": True}
+    left_out: Any = {**words, "sources": True, "experiments": {"__all__": words}}
+    settings = json.dumps(study.model_dump(mode="json", exclude=left_out), sort_keys=True)
     return hashlib.sha256(settings.encode()).hexdigest()
 
 
