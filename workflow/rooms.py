@@ -74,9 +74,7 @@ def drawing() -> str:
     The ground is left out: every room may use it.
     """
     sizes = Counter(map(room, MODULES))
-    arrows = Counter(
-        (room(module), room(other)) for module, path in MODULES.items() for other in inner_imports(path)
-    )
+    arrows = Counter((room(module), room(other)) for module, path in MODULES.items() for other in inner_imports(path))
     lines = ["```mermaid", "flowchart TD"]
     lines += [f'    {name}["{name} ({sizes[name]})"]' for name in FLOORS if name != "ground"]
     for (source, target), count in sorted(arrows.items(), key=lambda arrow: tuple(map(FLOORS.index, arrow[0]))):
