@@ -1,0 +1,38 @@
+"""The README: short, complete on its first screen, and every file it names is a link that leads somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+WRITTEN = re.sub(r"<!-- reference: begin -->.*<!-- reference: end -->", "", README, flags=re.DOTALL)
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def test_what_is_written_by_hand_has_at_most_1200_words():
+    assert len(WRITTEN.split()) <= 1200
+
+
+def test_first_screen_has_the_commands():
+    first = "\n".join(README.splitlines()[:25])
+    assert all(f"make {target}" in first for target in ("reproduce", "test", "quick"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_to_files(page):
+    targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if "://" not in target and not (page.parent / target).exists()] == []
+
+
+def test_files_are_named_as_links():
+    prose = re.sub(r"```.*?```", "", WRITTEN, flags=re.DOTALL)
+    named = re.findall(r"(?<!\[)`([\w./-]+)`", prose)
+    tracked = [name for name in named if ("/" in name or "." in name) and (ROOT / name).exists()]
+    assert [name for name in tracked if name != ".venv"] == []
+
+
+def test_every_make_target_that_is_named_exists():
+    targets = set(re.findall(r"^([a-z_-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
+    assert set(re.findall(r"(?:`|^)make ([a-z_-]+)", WRITTEN, flags=re.MULTILINE)) <= targets
