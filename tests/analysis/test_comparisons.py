@@ -7,7 +7,7 @@ from scipy import stats as scipy_stats
 
 from reacher_shaping import stats
 from reacher_shaping.analysis import comparisons, learning_curves, single_seed_studies
-from reacher_shaping.analysis.claim_estimates import BEST, TABLE_2, TABLE_3
+from reacher_shaping.analysis.claim_formulas import BEST, TABLE_2, TABLE_3
 from reacher_shaping.analysis.runs import RUNS
 from reacher_shaping.report import paper_tables
 
@@ -37,37 +37,54 @@ def at(frame, **values):
 
 
 def test_families_compare_the_cells_they_name():
-    frame = at(comparisons.comparison_frame(make_runs(), 0), metric="success_rate")
-    assert frame.groupby("family").size().to_dict() == {"none": 21, "constant": 12, "longer": 9, "half": 5}
+    frame = at(comparisons.comparison_frame(make_runs()), metric="success_rate")
+    assert frame.groupby("family").size().to_dict() == {
+        "none": 21, "constant": 12, "longer": 9, "half": 5, "squared": 6,
+    }  # fmt: skip
     against_none = at(frame, family="none")
     assert (against_none["other_variant"] == "none").all()
     assert (against_none["other_budget"] == against_none["budget"]).all()
     decayed = at(frame, family="constant", variant="decay200k_l2sq").iloc[0]
     assert (decayed["other_variant"], decayed["other_alpha0"]) == ("l2sq", 0.5)
+    squared = at(frame, family="squared")
+    assert set(squared["variant"]) == {"l2sq", "decay200k_l2sq", "decay300k_l2sq", "decay500k_l2sq"}
+    assert (squared["other_variant"] == squared["variant"].str.removesuffix("_l2sq").replace("l2sq", "l2")).all()
+    assert (squared["alpha0"] == squared["other_alpha0"]).all()
     longer = at(frame, family="longer", variant="none").iloc[0]
     assert (longer["budget"], longer["other_budget"]) == (1_000_000, 500_000)
 
 
 def test_a_comparison_is_the_paired_difference_of_its_two_cells():
     runs = make_runs(gain={("l2", 500_000, 1.0): 0.3})
-    row = at(comparisons.comparison_frame(runs, 0), family="none", metric="success_rate", variant="l2", budget=500_000)
+    row = at(comparisons.comparison_frame(runs), family="none", metric="success_rate", variant="l2", budget=500_000)
     row = at(row, alpha0=1.0).iloc[0]
     ours, theirs = (at(runs, variant=v, budget=500_000, alpha0=1.0)["success_rate"].to_numpy() for v in ("l2", "none"))
     assert row["difference"] == pytest.approx((ours - theirs).mean())
-    assert row["p"] == 2 / 64  # the smallest possible with six pairs
+    assert row["p"] == pytest.approx(scipy_stats.ttest_rel(ours, theirs).pvalue)
     assert row["improvement"] == pytest.approx(scipy_stats.mannwhitneyu(ours, theirs).statistic / 36)
     assert row["ci_low"] < row["difference"] < row["ci_high"]
 
 
 def test_holm_is_over_one_family_of_one_metric():
-    frame = comparisons.comparison_frame(make_runs(), 0)
+    frame = comparisons.comparison_frame(make_runs())
     own = at(frame, family="half", metric="mean_return")
     np.testing.assert_allclose(own["p_holm"], stats.holm(own["p"]))
     assert (frame["p_holm"] >= frame["p"]).all()
 
 
+def test_limits_of_a_family_hold_for_all_its_comparisons_at_once():
+    """Bonferroni's: of 21 comparisons each is read at 1 - 0.05 / 21."""
+    runs = make_runs()
+    row = at(comparisons.comparison_frame(runs), family="none", metric="mean_return", variant="l2", alpha0=0.5).iloc[0]
+    ours, theirs = (
+        at(runs, variant=v, budget=500_000, alpha0=a)["mean_return"].to_numpy() for v, a in (("l2", 0.5), ("none", 1.0))
+    )
+    oracle = scipy_stats.ttest_rel(ours, theirs).confidence_interval(1 - 0.05 / 21)
+    assert (row["family_low"], row["family_high"]) == pytest.approx(tuple(oracle))
+
+
 def test_smaller_distance_is_an_improvement():
-    frame = at(comparisons.comparison_frame(make_runs(gain={BEST: 0.5}), 0), family="none", variant="decay300k")
+    frame = at(comparisons.comparison_frame(make_runs(gain={BEST: 0.5})), family="none", variant="decay300k")
     best = at(frame, budget=1_000_000).set_index("metric")
     assert best.loc["final_distance", "difference"] < 0
     assert best.loc["final_distance", "improvement"] == best.loc["success_rate", "improvement"] == 1
@@ -76,11 +93,11 @@ def test_smaller_distance_is_an_improvement():
 def test_only_common_seeds_are_compared():
     runs = make_runs(cells=[("none", 500_000, 1.0), ("l2", 500_000, 1.0)])
     runs = runs[~((runs["variant"] == "none") & (runs["seed"] < 2))]
-    assert (comparisons.comparison_frame(runs, 0)["seeds"] == 4).all()
+    assert (comparisons.comparison_frame(runs)["seeds"] == 4).all()
 
 
 def test_a_study_without_pairs_has_an_empty_table():
-    frame = comparisons.comparison_frame(make_runs(cells=[("l2", 500_000, 1.0)]), 0)
+    frame = comparisons.comparison_frame(make_runs(cells=[("l2", 500_000, 1.0)]))
     assert frame.empty
     assert {"family", "difference", "p_holm", "seeds"} <= set(frame.columns)
 
@@ -89,6 +106,7 @@ def test_variance_of_a_cell_is_split():
     frame = comparisons.variance_frame(make_runs(cells=[("l2", 500_000, 1.0)], seeds=400, noise=0.08))
     assert frame["seed_variance"].iloc[0] == pytest.approx(0.08**2, rel=0.15)
     assert frame["evaluation_variance"].iloc[0] == pytest.approx(0.3 * 0.7 / 1000, rel=0.1)
+    assert frame["resets_deviation"].iloc[0] == pytest.approx(np.sqrt(0.3 * 0.7 / 1000), rel=0.05)
 
 
 def test_power_is_for_the_published_gain():

@@ -56,6 +56,13 @@ def test_a_shaking_curve_is_rougher_than_a_smooth_one_at_any_level():
     assert rough[1] > rough[2] > rough[0]
 
 
+def test_shaking_is_in_units_of_return_and_does_not_move_with_its_level():
+    """The settled part of a sawtooth of step 2: first differences +2, -2, ..."""
+    curve = np.tile([0.0, 2.0], 50)
+    found, lower = learning_curves.shaking([curve, curve - 100])
+    assert found == lower == pytest.approx(2, rel=0.01)
+
+
 def test_the_first_rise_is_not_roughness():
     flat = np.full(245, -10.0)
     rising = flat.copy()

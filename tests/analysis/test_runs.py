@@ -101,7 +101,7 @@ def test_diverged_run_is_marked_and_left_out_of_the_means():
     progress.loc[(progress["seed"] == 2) & (progress["iteration"] > 10), "episode_return"] = np.nan
     runs = runs_frame([(key, progress, episodes)])
     assert runs["diverged"].tolist() == [False, False, True]
-    cell = cells_frame(runs, 0).iloc[0]
+    cell = cells_frame(runs).iloc[0]
     assert cell["diverged"] == 1
     assert cell["seeds"] == 3
     assert cell["final_return"] == pytest.approx(runs["final_return"].iloc[:2].mean())
@@ -116,11 +116,13 @@ def test_missing_deterministic_evaluation_is_missing_not_zero():
 
 def test_cell_holds_mean_iqm_and_interval_of_its_seeds():
     runs = runs_frame([make_block(seeds=range(8)), make_block("none", seeds=range(8))])
-    cells = cells_frame(runs, 5)
+    cells = cells_frame(runs)
     row, own = cells[cells["variant"] == "l2"].iloc[0], runs[runs["variant"] == "l2"]
     assert row["seeds"] == 8
     assert row["interval"] == OVER_SEEDS
     for name in METRICS:
+        if name == "steps_to_threshold":
+            continue
         assert row[name] == pytest.approx(own[name].mean(), nan_ok=True)
         assert row[f"{name}_low"] <= row[name] + 1e-12
         assert row[name] <= row[f"{name}_high"] + 1e-12
@@ -130,15 +132,33 @@ def test_cell_holds_mean_iqm_and_interval_of_its_seeds():
 
 def test_interval_of_a_cell_does_not_depend_on_the_other_cells():
     l2, none = make_block(seeds=range(4)), make_block("none", seeds=range(4))
-    together = cells_frame(runs_frame([l2, none]), 5)
+    together = cells_frame(runs_frame([l2, none]))
     runs = runs_frame([l2])
-    alone = cells_frame(runs, 5).iloc[0]
+    alone = cells_frame(runs).iloc[0]
     assert together[together["variant"] == "l2"].iloc[0]["mean_return_low"] == alone["mean_return_low"]
+
+
+def test_a_run_that_never_gets_there_counts_at_its_whole_budget():
+    """Else a rule would seem the faster the more of its runs fail."""
+    runs = runs_frame([make_block("none", seeds=range(4)), make_block(seeds=range(4), level=-30.0)])
+    slow = cells_frame(runs).set_index("variant").loc["l2"]
+    assert runs.set_index("variant").loc["l2", "steps_to_threshold"].isna().all()
+    assert slow["steps_to_threshold"] == KEY["budget"]
+
+
+def test_limits_of_a_rate_end_at_one():
+    runs = runs_frame([make_block(seeds=range(3))]).assign(success_rate=[0.9, 1.0, 1.0])
+    assert cells_frame(runs)["success_rate_high"].iloc[0] == 1
+
+
+def test_runs_kept_from_before_a_measure_have_no_column_of_it():
+    runs = runs_frame([make_block()]).drop(columns="shaking")
+    assert "shaking" not in cells_frame(runs)
 
 
 def test_one_seed_gets_a_wilson_interval_over_episodes_and_says_so():
     runs = runs_frame([make_block(seeds=(4,), episodes=50)])
-    cell = cells_frame(runs, 0).iloc[0]
+    cell = cells_frame(runs).iloc[0]
     p, n, z = cell["success_rate"], 50, scipy_stats.norm.ppf(0.975)
     centre, half = p + z**2 / (2 * n), z * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
     assert cell["interval"] == OVER_EPISODES
@@ -151,35 +171,53 @@ def test_one_seed_gets_a_wilson_interval_over_episodes_and_says_so():
 def published_table_2():
     table = pd.read_csv(PUBLISHED / "table2.csv")
     budget = table["num_episodes"].map({"500K": 500_000, "1M": 1_000_000})
-    return table.rename(columns={"variant_base": "variant", "alpha": "alpha0"}).assign(protocol="paper", budget=budget)
+    return table.rename(columns={"variant_base": "variant", "alpha": "alpha0"}).assign(
+        protocol="paper", budget=budget, seed=0
+    )
 
 
 def test_published_table_gives_the_published_correlations():
     """The paper prints 0.91, 0.37, 0.30 (its Fig. 3); from its Table 2 they are 0.910, 0.369, 0.305."""
-    matrix = correlations(published_table_2(), "cells", np.random.default_rng(0))
+    matrix = correlations(published_table_2(), "cells")
     r = matrix[matrix["method"] == "pearson"].set_index(["x", "y"])["r"]
     assert r["alpha0", "mean_return"] == pytest.approx(0.910, abs=5e-4)
     assert r["success_rate", "mean_return"] == pytest.approx(0.369, abs=5e-4)
     assert r["success_rate", "budget"] == pytest.approx(0.305, abs=5e-4)
     assert (matrix["n"] == 17).all()
+    assert matrix[["ci_low", "ci_high"]].isna().all(axis=None)  # one seed: other cells are no other seeds
 
 
 def test_correlations_agree_with_pandas_and_are_symmetric():
     rows = published_table_2()
-    matrix = correlations(rows, "cells", np.random.default_rng(0))
+    matrix = correlations(rows, "cells")
     for method in ("pearson", "spearman"):
         own = matrix[matrix["method"] == method].pivot(index="x", columns="y", values="r")
         oracle = rows[CORRELATED].corr(method)
         np.testing.assert_allclose(own.loc[oracle.index, oracle.columns], oracle, atol=1e-12)
-    off = matrix[matrix["x"] != matrix["y"]]
-    assert (off["ci_low"] <= off["r"]).all()
-    assert (off["r"] <= off["ci_high"]).all()
+
+
+@pytest.mark.parametrize("level", ["cells", "runs"])
+def test_interval_of_a_correlation_leaves_out_a_seed_in_every_cell_at_once(level):
+    blocks = [make_block(name, seeds=range(6), budget=b) for name in ("none", "l2", "decay200k") for b in (1, 2)]
+    runs = runs_frame(blocks)
+    matrix = correlations(runs, level).set_index(["method", "x", "y"])
+
+    def r(rows):
+        measures = ["success_rate", "mean_return"]
+        points = rows[measures] if level == "runs" else rows.groupby(["variant", "budget"])[measures].mean()
+        return np.arctanh(points.corr().iloc[0, 1])
+
+    z, left_out = r(runs), np.array([r(runs[runs["seed"] != seed]) for seed in range(6)])
+    half = scipy_stats.t.ppf(0.975, 5) * np.sqrt(5 / 6 * ((left_out - left_out.mean()) ** 2).sum())
+    row = matrix.loc["pearson", "success_rate", "mean_return"]
+    assert np.arctanh([row["ci_low"], row["r"], row["ci_high"]]) == pytest.approx([z - half, z, z + half])
+    assert np.isnan(matrix.loc[("pearson", "alpha0", "budget"), "ci_low"])
 
 
 def test_correlation_frame_keeps_appendix_and_protocols_apart():
     blocks = [make_block(name, budget=b) for name in ("none", "l2", "decay200k_l2sq") for b in (500_000, 1_000_000)]
     blocks += [make_block(name, protocol="standard") for name in ("none", "l2")]
-    frame = correlation_frame(runs_frame(blocks), 0)
+    frame = correlation_frame(runs_frame(blocks))
     n = frame.groupby(["protocol", "level"])["n"].first()
     assert n["paper"].to_dict() == {"cells": 4, "cells_all": 6, "runs": 12, "runs_all": 18}
     assert n["standard", "cells"] == 2
@@ -199,7 +237,7 @@ def test_radius_frame_counts_from_the_distances():
 def test_radius_cells_average_over_seeds():
     key, _, episodes = make_block(seeds=range(4))
     radius = radius_frame([(key, episodes)])
-    cells = radius_cells(radius, 0)
+    cells = radius_cells(radius)
     at = (radius["mode"] == "stochastic") & (radius["radius"] == 0.03)
     row = cells[(cells["mode"] == "stochastic") & (cells["radius"] == 0.03)].iloc[0]
     assert row["seeds"] == 4

@@ -38,7 +38,7 @@ def study(tmp_path_factory):
     write_table(results / "correlation_published.csv", published, schemas.CORRELATION)
     write_table(results / "claims.csv", synthetic.claims(), schemas.CLAIMS)
     runs = synthetic.runs(grid, 2)
-    write_table(results / "comparisons.parquet", comparisons.comparison_frame(runs, 0), schemas.COMPARISONS)
+    write_table(results / "comparisons.parquet", comparisons.comparison_frame(runs), schemas.COMPARISONS)
     write_table(results / "variance.parquet", comparisons.variance_frame(runs), schemas.VARIANCE)
     power = comparisons.power_frame(runs, synthetic.published())
     write_table(results / "power.parquet", power, schemas.POWER)

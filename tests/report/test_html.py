@@ -328,6 +328,6 @@ def test_captions_count_seeds_and_episodes_from_the_tables():
     text = captions.caption("figure_2", cells, runs)
     assert "1,000 evaluation episodes" in text
     assert "mean over 7 seeds" in text
-    assert "95 % bootstrap over seeds" in text
+    assert "95 % t over seeds" in text
     assert captions.title("figure_2") == "Figure 2. Success rates"
     assert captions.caption("figure_1", synthetic.cells(synthetic.TOY_GRID, 1)).count("1 seed ") == 1

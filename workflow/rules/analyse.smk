@@ -1,5 +1,6 @@
 # From the blocks' tables to the study's: runs, cells, learning curves, correlations, claims.
 TABLES = [f"results/{entry.file}" for entry in STUDY_TABLES.values() if entry.always]
+RUN_RADII = f"results/{STUDY_TABLES['run_radii'].file}"
 BLOCK_CELLS = block_cells(STUDY.cells, STUDY.seeds)
 PUBLISHED = {
     "table2": source("report/published/table2.csv"),
@@ -25,7 +26,6 @@ rule aggregate_runs:
     threads: 1
     params:
         cells=BLOCK_CELLS,
-        root_seed=STUDY.root_seed,
         code=code("aggregate_runs"),
     script:
         "../scripts/aggregate_runs.py"
@@ -43,7 +43,6 @@ rule correlate:
         "results/benchmarks/correlate.tsv"
     threads: 1
     params:
-        root_seed=STUDY.root_seed,
         code=code("correlate"),
     script:
         "../scripts/correlate.py"
@@ -62,7 +61,6 @@ rule summarise_episodes:
     threads: 1
     params:
         cells=BLOCK_CELLS,
-        root_seed=STUDY.root_seed,
         code=code("summarise_episodes"),
     script:
         "../scripts/summarise_episodes.py"
@@ -110,6 +108,7 @@ rule judge_claims:
     input:
         **PUBLISHED,
         **tables_read("judge_claims"),
+        run_radii=RUN_RADII,
         peers=PEERS,
         ledger=source("report/claims.yaml"),
     output:
@@ -120,7 +119,7 @@ rule judge_claims:
         "results/benchmarks/judge_claims.tsv"
     threads: 1
     params:
-        root_seed=STUDY.root_seed,
+        protocol=STUDY.cells[0].protocol.name,
         code=code("judge_claims"),
     script:
         "../scripts/judge_claims.py"

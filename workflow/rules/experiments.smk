@@ -22,7 +22,6 @@ use rule aggregate_runs as aggregate_experiment with:
         "results/benchmarks/experiments/{experiment}/aggregate.tsv"
     params:
         cells=of_experiment(block_cells),
-        root_seed=STUDY.root_seed,
         code=code("aggregate_runs"),
 
 
@@ -89,7 +88,6 @@ rule summarise_experiment:
     threads: 1
     params:
         cells=of_experiment(block_cells),
-        root_seed=STUDY.root_seed,
         code=code("summarise_experiment"),
     script:
         "../scripts/summarise_experiment.py"
@@ -110,7 +108,6 @@ rule measure_effects:
     params:
         switches=lambda wildcards: as_json(STUDY.experiments[wildcards.experiment].switches.model_dump()),
         protocols=of_experiment(protocols_of),
-        root_seed=STUDY.root_seed,
         code=code("measure_effects"),
     script:
         "../scripts/measure_effects.py"

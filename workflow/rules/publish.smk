@@ -8,6 +8,7 @@ rule build_crate:
             BLOCK_FILES,
             expand("{block}/{file}", block=BLOCKS, file=["training.json", "long_episodes.parquet"]),
             TABLES,
+            RUN_RADII,
             FIGURES,
             FURTHER_FIGURES,
             FORMATTED_TABLES,

@@ -26,5 +26,5 @@ with logged(snakemake.log[0]):
         [read_table(path, block_schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
     )
     write_table(output.runs, runs, schemas.RUNS)
-    write_table(output.cells, cells_frame(runs, params.root_seed), schemas.CELLS)
+    write_table(output.cells, cells_frame(runs), schemas.CELLS)
     write_table(output.curves, learning_curves.curve_table(progress), schemas.CURVES)

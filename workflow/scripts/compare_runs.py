@@ -14,7 +14,7 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 with logged(snakemake.log[0]):
     runs = read_table(given.runs, schemas.RUNS)
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
-    compared = comparisons.comparison_frame(runs, params.root_seed)
+    compared = comparisons.comparison_frame(runs)
     write_table(output.comparisons, compared, schemas.COMPARISONS)
     write_table(output.variance, comparisons.variance_frame(runs), schemas.VARIANCE)
     write_table(output.power, comparisons.power_frame(runs, published), schemas.POWER)

@@ -4,17 +4,13 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping.analysis.correlation import correlation_frame, correlations, in_table_2
-from reacher_shaping.random_streams import generator
 from reacher_shaping.report import paper_tables
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table, write_table
 
-root_seed = snakemake.params.root_seed
-
 with logged(snakemake.log[0]):
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     published = paper_tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))
-    main_grid = published[in_table_2(published)]
-    theirs = correlations(main_grid, "cells", generator(root_seed, "published"))
-    write_table(snakemake.output.correlation, correlation_frame(runs, root_seed), schemas.CORRELATION)
+    theirs = correlations(published[in_table_2(published)].assign(seed=0), "cells")
+    write_table(snakemake.output.correlation, correlation_frame(runs), schemas.CORRELATION)
     write_table(snakemake.output.correlation_published, theirs.assign(protocol="published"), schemas.CORRELATION)

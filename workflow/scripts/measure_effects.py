@@ -16,5 +16,5 @@ protocols = {settings["name"]: Protocol.model_validate(settings) for settings in
 with logged(snakemake.log[0]):
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     switches = Switches.model_validate_json(params.switches)
-    effects = switch_effects.effects_frame(runs, switches, protocols, params.root_seed)
+    effects = switch_effects.effects_frame(runs, switches, protocols)
     write_table(snakemake.output[0], effects, schemas.EFFECTS)

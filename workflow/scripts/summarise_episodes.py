@@ -15,8 +15,9 @@ with logged(snakemake.log[0]):
         (cell, read_table(unchanged(path), block_schemas.EPISODES))
         for cell, path in zip(params.cells, given.episodes, strict=True)
     )
-    radii = radius_cells(radius_frame(episodes), params.root_seed)
-    write_table(output.radii, radii, schemas.RADII)
+    radii = radius_frame(episodes)
+    write_table(output.run_radii, radii, schemas.RUN_RADII)
+    write_table(output.radii, radius_cells(radii), schemas.RADII)
     long = pd.concat(
         [
             read_table(path, block_schemas.LONG_EPISODES).assign(**cell)
@@ -25,4 +26,4 @@ with logged(snakemake.log[0]):
         ignore_index=True,
     )
     write_table(output.long_episodes, long, schemas.ALL_LONG_EPISODES)
-    write_table(output.lengths, length_cells(long, params.root_seed), schemas.LENGTHS)
+    write_table(output.lengths, length_cells(long), schemas.LENGTHS)

@@ -82,8 +82,7 @@ def _peer_row(algorithm: str, budget: int, runs: pd.DataFrame) -> dict[str, Any]
     row["diverged"] = int((~np.isfinite(runs["mean_return"])).sum())
     for name in BASELINE_METRICS:
         sample = runs[name]
-        # Welch's interval against a constant is the t interval of the mean.
-        low, high = stats.welch_interval(sample, np.zeros(2))
+        low, high = stats.t_interval(sample)
         if name.endswith("rate"):
             low, high = np.clip([low, high], 0.0, 1.0)
         row |= {name: stats.mean(sample), f"{name}_low": low, f"{name}_high": high}
@@ -105,3 +104,10 @@ def _controller_rows(controllers: pd.DataFrame | None, protocol: str | None) -> 
         | {name: row[name] for name in BASELINE_METRICS if name in row}
         for row in ours.to_dict("records")
     ]
+
+
+def untrained_success(controllers: pd.DataFrame, protocol: str | None = None) -> float | None:
+    """Success rate of a network before training, actions sampled; None where it was not evaluated."""
+    ours = stochastic(controllers, protocol)
+    found = ours.loc[ours["controller"] == "untrained network", "success_rate"]
+    return float(found.iloc[0]) if len(found) else None

@@ -1,73 +1,47 @@
-"""The claims ledger: from estimates and rules fixed beforehand to verdicts.
+"""The claims ledger: from estimates and rules to verdicts, and what each verdict is worth.
 
-The ledger (`report/claims.yaml`, which explains its fields) holds for each claim a rule per estimate. The
-rules are about intervals: a claim is reproduced when every value the data leave open agrees with it, not
-reproduced when none does, and inconclusive in between. So noise around no effect is called a reproduction
-in at most one case of forty per estimate, and a weak study ends inconclusive, not negative.
+The ledger (`report/claims.yaml`, which explains its fields) holds for each claim dated tests with a rule per estimate;
+the newest counts and the older ones stay beside it. The rules are about intervals: a claim is reproduced when every
+value the data leave open agrees with it, not reproduced when none does, and inconclusive in between. So noise around no
+effect is called a reproduction in at most one case of forty per estimate, and a weak study ends inconclusive, not
+negative. A verdict is given only where another study of as many seeds would come to it again with a probability of at
+least 0.9 (`replication`); else the claim is inconclusive, with the number of seeds that would decide.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from reacher_shaping import stats
-from reacher_shaping.analysis import claim_estimates as e
-from reacher_shaping.labels import CELL
-from reacher_shaping.random_streams import generator
+from reacher_shaping.analysis import replication as r
+from reacher_shaping.analysis.claim_estimates import Estimate
+from reacher_shaping.analysis.claim_formulas import PEERS, Measured, Study, as_published, measure
 
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 INCONCLUSIVE = "inconclusive"
 UNTESTABLE = "untestable"
-# Below five seeds a bootstrap over seeds covers too little; Welch's t interval holds from three.
+
+# Below five seeds a t interval hangs on the normality of the seeds; Welch's between algorithms is taken from three.
 FEWEST_SEEDS = 5
 FEWEST_PEERS = 3
-FORMULAS: dict[str, Callable[[e.Sample], e.Estimates]] = {
-    "C1": e.shaping_improves,
-    "C2": e.decay300k_is_best,
-    "C3": e.decay_beats_constant,
-    "C4": e.smoothness_goes_with_success,
-    "C5": e.none_stays_low,
-    "C6": e.returns_peak_early,
-    "C7": e.decay300k_levels,
-    "C8": e.longer_helps_some,
-    "C9": e.half_alpha_hurts,
-    "C10": e.correlations,
-    "C11": e.success_despite_return,
-    "C12": e.l2_gains_l2sq_does_not,
-    "C13": e.best_doubles_baseline,
-    "C14": e.longer_episodes_deteriorate,
-    "C15": e.squared_decay_plunges,
-    "C16": e.top_five_above,
-    "C17": e.shaping_is_faster,
-    "C18": e.ppo_often_fails,
-}
-PEERS = "C19"
-LONG_EPISODES = "C14"
-Rule = Mapping[str, Any]
+
+Entry = Mapping[str, Any]
 
 
-def judge(low: float, high: float, rule: Rule) -> str:
+def judge(low: float, high: float, rule: r.Rule) -> str:
     """Verdict on one estimate from its interval; without an interval inconclusive.
 
     Where an interval is both above `above` and below `refuted_below` the effect has the right sign but is
     smaller than worth the name: not reproduced.
     """
-    if "below" in rule:
-        mirrored = {"above": -rule["below"]}
-        if "refuted_above" in rule:
-            mirrored["refuted_below"] = -rule["refuted_above"]
-        return judge(-high, -low, mirrored)
-    if "within" in rule:
-        first, last = rule["within"]
-        inside, outside = low >= first and high <= last, high < first or low > last
-    else:
-        inside, outside = low > rule["above"], high < rule.get("refuted_below", rule["above"])
-    if outside:
+    marks = r.band(rule)
+    if high < marks.refuted_below or low > marks.refuted_above:
         return NOT_REPRODUCED
-    return REPRODUCED if inside else INCONCLUSIVE
+    return REPRODUCED if low > marks.holds_above and high < marks.holds_below else INCONCLUSIVE
 
 
 def combine(verdicts: Sequence[str]) -> str:
@@ -78,78 +52,7 @@ def combine(verdicts: Sequence[str]) -> str:
     return REPRODUCED
 
 
-def estimate(claim: str, sample: e.Sample | None) -> e.Estimates:
-    """Estimates of one claim; none where the study lacks what it takes."""
-    if sample is None:
-        return {}
-    sample.start()
-    try:
-        return FORMULAS[claim](sample)
-    except e.MissingError:
-        return {}
-
-
-def widen(long_episodes: pd.DataFrame) -> pd.DataFrame:
-    """Runs x episode lengths (`steps`, `final_distance`) -> a row per run with `final_distance_<steps>`."""
-    key = [*CELL, "seed"]
-    wide = long_episodes.pivot_table(index=key, columns="steps", values="final_distance")
-    return wide.add_prefix("final_distance_").reset_index()
-
-
-def measure(
-    runs: pd.DataFrame,
-    root_seed: int,
-    protocol: str = "paper",
-    peers: pd.DataFrame | None = None,
-    long_episodes: pd.DataFrame | None = None,
-    resamples: int = stats.RESAMPLES,
-) -> dict[str, e.Estimates]:
-    """Estimates of all claims, by claim and name; an untestable claim has none.
-
-    `runs`: rows of `runs.parquet`. `long_episodes` (C14): the cell's key, `seed`, `steps` (episode length)
-    and `final_distance` in metres, stochastic policy. `peers` (C19): `algorithm`, `seed`, `success_rate`.
-    """
-
-    def sample_of(rows: pd.DataFrame) -> e.Sample | None:
-        return e.Sample(rows, generator(root_seed, "claims"), resamples) if len(rows) else None
-
-    study = sample_of(e.derive(runs[runs["protocol"] == protocol]))
-    long = None if long_episodes is None else sample_of(widen(long_episodes[long_episodes["protocol"] == protocol]))
-    found = {claim: estimate(claim, long if claim == LONG_EPISODES else study) for claim in FORMULAS}
-    try:
-        found[PEERS] = e.off_policy_is_better(peers) if peers is not None else {}
-    except e.MissingError:
-        found[PEERS] = {}
-    return found
-
-
-def assess(
-    ledger: Sequence[Mapping[str, Any]], measured: Mapping[str, e.Estimates], published: Mapping[str, e.Estimates]
-) -> pd.DataFrame:
-    """A row per estimate: id, part, published, measured, ci_low, ci_high, seeds, rule, verdict."""
-    rows = []
-    for entry in ledger:
-        claim = entry["id"]
-        fewest = FEWEST_PEERS if claim == PEERS else FEWEST_SEEDS
-        for part, rule in entry["rules"].items():
-            value = measured.get(claim, {}).get(part)
-            theirs = published.get(claim, {}).get(part)
-            row = {"id": claim, "part": part, "published": theirs.value if theirs else np.nan}
-            row |= dict(
-                zip(("measured", "ci_low", "ci_high", "seeds"), value or (np.nan, np.nan, np.nan, 0), strict=True)
-            )
-            row["rule"] = describe(rule)
-            if value is None:
-                row["verdict"] = UNTESTABLE
-            elif value.seeds < fewest:
-                row["verdict"] = INCONCLUSIVE
-            else:
-                row["verdict"] = judge(value.low, value.high, rule)
-            rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def describe(rule: Rule) -> str:
+def describe(rule: r.Rule) -> str:
     """A rule in words, for tables."""
     if "within" in rule:
         return f"within {rule['within'][0]:g} and {rule['within'][1]:g}"
@@ -160,20 +63,162 @@ def describe(rule: Rule) -> str:
     return words + (f", refuted if {opposite} {rule[other]:g}" if other in rule else "")
 
 
-def claims_frame(ledger: Sequence[Mapping[str, Any]], parts: pd.DataFrame) -> pd.DataFrame:
-    """`claims.csv`: id, claim, published, measured, ci_low, ci_high, test, verdict.
+def family_level(ledger: Sequence[Entry], measured: Measured, level: float = stats.LEVEL) -> float:
+    """Level at which each estimate of the newest tests is read so that all of them together have `level`."""
+    count = sum(part in measured[entry["id"]] for entry in ledger for part in entry["tests"][-1]["rules"])
+    return 1 - (1 - level) / max(count, 1)
 
-    The numbers are those of the claim's first estimate; the verdict is over all of them.
+
+@dataclass(frozen=True)
+class Part:
+    """One estimate under one rule: ours, ours at the family's level, the published one, ours were the paper true."""
+
+    claim: str
+    name: str
+    dated: str
+    current: bool
+    rule: r.Rule
+    ours: Estimate | None
+    family: Estimate | None
+    published: Estimate | None
+    if_true: Estimate | None
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are the seeds that a verdict takes."""
+        return self.ours is not None and self.ours.seeds >= (FEWEST_PEERS if self.claim == PEERS else FEWEST_SEEDS)
+
+    def verdict(self, estimate: Estimate | None) -> str:
+        """Verdict from one of the intervals."""
+        if estimate is None:
+            return UNTESTABLE
+        return judge(estimate.low, estimate.high, self.rule) if self.enough else INCONCLUSIVE
+
+    @property
+    def again(self) -> r.Chances:
+        """Chances in another study of as many seeds."""
+        return r.chances(self.ours, self.rule) if self.ours and self.enough else r.UNKNOWN
+
+    @property
+    def true(self) -> r.Chances:
+        """Chances in such a study were the published tables exactly true; NaN where they say nothing."""
+        if not (self.if_true and self.published and self.enough):
+            return r.UNKNOWN
+        return r.chances(self.if_true, self.rule, r.KNOWN)
+
+
+def judged(ledger: Sequence[Entry], study: Study, published: pd.DataFrame) -> list[Part]:
+    """Every estimate of every test, a claim's newest test first. `published` comes from `published_cells`."""
+    measured = measure(study)
+    family = measure(study, family_level(ledger, measured))
+    theirs = measure(Study(published.assign(seed=0), untrained=study.untrained))
+    if_true = measure(as_published(study, published))
+    found = []
+    for entry in ledger:
+        for test in reversed(entry["tests"]):
+            for name, rule in test["rules"].items():
+                values = [source[entry["id"]].get(name) for source in (measured, family, theirs, if_true)]
+                newest = test is entry["tests"][-1]
+                found.append(Part(entry["id"], name, str(test["dated"]), newest, rule, *values))
+    return found
+
+
+def parts_frame(parts: Sequence[Part]) -> pd.DataFrame:
+    """`claim_parts.csv`: a row per claim, test and estimate.
+
+    Columns: id, part, published, measured, ci_low, ci_high, seeds, rule, verdict (of this estimate alone), dated,
+    current (whether the test is the newest), family_low, family_high, family_verdict (limits that hold for all current
+    estimates at once), replication (chance of the same verdict in another study of as many seeds), power and
+    refuted_if_true (chance to find the estimate reproduced, or refuted, were the published tables exactly true), and
+    the rule's marks (`replication.Band`).
+    """
+    rows = []
+    for part in parts:
+        ours = part.ours or Estimate(np.nan, np.nan, np.nan, 0)
+        family = part.family or ours
+        row: dict[str, Any] = {
+            "id": part.claim,
+            "part": part.name,
+            "published": part.published.value if part.published else np.nan,
+        }
+        row |= {"measured": ours.value, "ci_low": ours.low, "ci_high": ours.high, "seeds": ours.seeds}
+        row |= {"rule": describe(part.rule), "verdict": part.verdict(part.ours)}
+        row |= {"dated": part.dated, "current": part.current, "family_low": family.low, "family_high": family.high}
+        row |= {"family_verdict": part.verdict(part.family), "replication": again(row["verdict"], part.again)}
+        row |= {"power": part.true.holds, "refuted_if_true": part.true.refuted}
+        rows.append(row | r.band(part.rule)._asdict())
+    return pd.DataFrame(rows)
+
+
+def again(verdict: str, chances: r.Chances) -> float:
+    """Chance that the same verdict comes out in another study; NaN where it is not known or nothing was tested."""
+    unclear = float(np.clip(1 - chances.holds - chances.refuted, 0.0, 1.0))
+    return {REPRODUCED: chances.holds, NOT_REPRODUCED: chances.refuted, INCONCLUSIVE: unclear}.get(verdict, np.nan)
+
+
+def claims_frame(ledger: Sequence[Entry], parts: Sequence[Part]) -> pd.DataFrame:
+    """`claims.csv`: id, claim, published, measured, ci_low, ci_high, test, verdict, and what the verdict is worth.
+
+    The numbers are those of the claim's first estimate; the verdicts are over all of them. Further columns:
+
+    | column | |
+    |---|---|
+    | dated | day of the test |
+    | replication | chance that another study of as many seeds comes to `interval_verdict` |
+    | interval_verdict | what the intervals say; with a `replication` below 0.9 `verdict` is inconclusive instead |
+    | seeds_to_decide | seeds that would decide it, were the estimates the truth; missing for a verdict that is given |
+    | family_verdict | with limits that hold for all estimates of the ledger at once |
+    | power, refuted_if_true | chance to come out reproduced, or refuted, were the published tables exactly true |
+    | published_holds | whether the published numbers themselves meet the rules; missing where there are none |
+    | first_dated, first_verdict | the test fixed before any run, and what the intervals say by it |
     """
     rows = []
     for entry in ledger:
-        own = parts[parts["id"] == entry["id"]]
-        numbers = own[["published", "measured", "ci_low", "ci_high"]].iloc[0].to_dict()
-        texts = {"id": entry["id"], "claim": entry["claim"], "test": entry["test"]}
-        rows.append(texts | numbers | {"verdict": combine(own["verdict"].to_list())})
-    return pd.DataFrame(rows)[["id", "claim", "published", "measured", "ci_low", "ci_high", "test", "verdict"]]
+        own = [part for part in parts if part.claim == entry["id"]]
+        current = [part for part in own if part.current]
+        first = [part for part in own if part.dated == str(entry["tests"][0]["dated"])]
+        rows.append(_claim(entry, current) | {"first_dated": first[0].dated, "first_verdict": _interval_verdict(first)})
+    return pd.DataFrame(rows)
 
 
-def published_estimates(cells: pd.DataFrame) -> dict[str, e.Estimates]:
-    """The claims' estimates on the published cells (`variant, budget, alpha0, success_rate, mean_return`)."""
-    return measure(cells.assign(protocol="published", seed=0), 0, "published", resamples=1)
+def _claim(entry: Entry, current: Sequence[Part]) -> dict[str, Any]:
+    """A claim's row but for its first test."""
+    numbers = parts_frame(current[:1]).iloc[0]
+    shown = {name: numbers[name] for name in ("published", "measured", "ci_low", "ci_high")}
+    verdict = _interval_verdict(current)
+    replication = again(verdict, r.together([part.again for part in current]))
+    settled = verdict in (REPRODUCED, NOT_REPRODUCED)
+    given = INCONCLUSIVE if settled and not replication >= r.ENOUGH else verdict
+    texts = {"id": entry["id"], "claim": entry["claim"]}
+    row = texts | shown | {"test": entry["tests"][-1]["test"], "verdict": given, "dated": current[0].dated}
+    true = r.together([part.true for part in current])
+    row |= {"replication": replication, "interval_verdict": verdict, "seeds_to_decide": np.nan}
+    if given == INCONCLUSIVE and all(part.enough for part in current):
+        row["seeds_to_decide"] = r.seeds_to_decide([p.ours for p in current if p.ours], [p.rule for p in current])
+    row |= {"family_verdict": combine([part.verdict(part.family) for part in current])}
+    row |= {"power": true.holds, "refuted_if_true": true.refuted, "published_holds": _published_holds(current)}
+    return row
+
+
+def _interval_verdict(parts: Sequence[Part]) -> str:
+    return combine([part.verdict(part.ours) for part in parts])
+
+
+def _published_holds(parts: Sequence[Part]) -> float:
+    """1 or 0: whether the published numbers, taken as exact, meet every rule; NaN where one is missing."""
+    values = [part.published.value if part.published else np.nan for part in parts]
+    if np.isnan(values).any():
+        return float("nan")
+    return float(all(judge(value, value, p.rule) == REPRODUCED for value, p in zip(values, parts, strict=True)))
+
+
+def family_frame(parts: Sequence[Part], level: float = stats.LEVEL) -> pd.DataFrame:
+    """`family_error.csv`: how often the ledger errs somewhere, a row per way of reading it.
+
+    Columns: reading (`each` estimate at its own level, or the `family` at once), level, estimates, worst (chance that
+    some claim is wrongly refuted where every true value lies on its mark and the estimates are independent).
+    """
+    count = sum(part.current and part.ours is not None for part in parts)
+    levels = {"each": level, "family": 1 - (1 - level) / max(count, 1)}
+    rows = [(reading, own, count, 1 - ((1 + own) / 2) ** count) for reading, own in levels.items()]
+    return pd.DataFrame(rows, columns=["reading", "level", "estimates", "worst"])

@@ -8,11 +8,13 @@ Families, stated before any run; Holm's correction is over one family of one met
 | constant | a decayed cell less its constant potential, same budget and alpha0 | does decay help? |
 | longer | a cell at its larger budget less the same at the smaller one | does training longer help? |
 | half | a cell at alpha0 = 0.5 less the same at 1 | does a weaker start hurt? |
+| squared | a cell of an L2-squared potential less the same of L2 | which potential learns better? |
 
-With n paired seeds the smallest exact sign-flip p is 2 / 2^n: 0.002 for ten. A family of more than 25
-comparisons could then never be significant after Holm, which is why not every pair of cells is compared.
+A difference has a t interval over common seeds, and one that holds for its whole family at once (Bonferroni): the
+best of a family is picked for its luck too, and only the latter holds for it.
 """
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -23,15 +25,14 @@ from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.analysis.runs import Block, curve_array
 from reacher_shaping.labels import CELL, KEY
-from reacher_shaping.random_streams import generator
 
 METRICS = ("success_rate", "mean_return", "final_success_rate", "final_distance")
 SPEED = ("area_under_curve",)
 """Learning speed, compared in the further studies. Steps to a threshold would leave out runs that never get there."""
-FAMILIES = ("none", "constant", "longer", "half")
+FAMILIES = ("none", "constant", "longer", "half", "squared")
 
 
-def partner(family: str, key: Mapping[str, Any], cells: pd.DataFrame) -> dict[str, Any] | None:
+def partner(family: str, key: Mapping[Any, Any], cells: pd.DataFrame) -> dict[str, Any] | None:
     """Key of the cell that `key` is compared with in a family; None if it takes no part. May not exist."""
     own, variant = dict(key), str(key["variant"])
     if family == "none" and variant != "none":
@@ -40,6 +41,8 @@ def partner(family: str, key: Mapping[str, Any], cells: pd.DataFrame) -> dict[st
         return labelled if there else labelled | {"alpha0": 1.0}
     if family == "constant" and variant.startswith("decay"):
         return own | {"variant": "l2sq" if variant.endswith("_l2sq") else "l2"}
+    if family == "squared" and variant.endswith("l2sq"):
+        return own | {"variant": "l2" if variant == "l2sq" else variant.removesuffix("_l2sq")}
     if family == "half" and key["alpha0"] == 0.5:
         return own | {"alpha0": 1.0}
     if family == "longer":
@@ -50,68 +53,67 @@ def partner(family: str, key: Mapping[str, Any], cells: pd.DataFrame) -> dict[st
     return None
 
 
-def comparison_frame(runs: pd.DataFrame, root_seed: int, metrics: Sequence[str] = METRICS) -> pd.DataFrame:
+def comparison_frame(runs: pd.DataFrame, metrics: Sequence[str] = METRICS) -> pd.DataFrame:
     """A row per metric and comparison of the families above, paired on common seeds.
 
-    Columns: family, metric, the cell's key, `other_variant, other_budget, other_alpha0`, difference, ci_low,
-    ci_high, p, p_holm, improvement (probability that a run of the cell beats one of the other; for
-    `final_distance` smaller is better), improvement_low, improvement_high, seeds.
+    Columns: family, metric, the cell's key, `other_variant, other_budget, other_alpha0`, difference, ci_low, ci_high,
+    p, p_holm, improvement (probability that a run of the cell beats one of the other; for `final_distance` smaller is
+    better), improvement_low, improvement_high, seeds, family_low, family_high (limits of the difference that hold for
+    all comparisons of the family and metric at once).
     """
     cells = runs[KEY].drop_duplicates()
     by_cell = {tuple(key): own.set_index("seed") for key, own in runs.groupby(KEY)}
     rows = []
     for family in FAMILIES:
-        for values in cells.itertuples(index=False, name=None):
-            key = dict(zip(KEY, values, strict=True))
-            other = partner(family, key, cells)
-            if other is None or tuple(other[name] for name in KEY) not in by_cell:
-                continue
+        pairs = [(key, other) for key in cells.to_dict("records") if (other := partner(family, key, cells))]
+        pairs = [pair for pair in pairs if tuple(pair[1][name] for name in KEY) in by_cell]
+        sizes = Counter(key["protocol"] for key, _ in pairs)
+        for key, other in pairs:
             ours, theirs = (by_cell[tuple(which[name] for name in KEY)] for which in (key, other))
-            named = {f"other_{name}": other[name] for name in KEY[1:]}
+            named = {name: key[name] for name in KEY} | {f"other_{name}": other[name] for name in KEY[1:]}
             for metric in metrics:
-                random = generator(root_seed, family, *key.values(), metric)
-                compared = _compare(
-                    ours[metric], theirs[metric], random, better=-1 if metric.endswith("distance") else 1
-                )
-                rows.append({"family": family, "metric": metric} | key | named | compared)
+                better = -1 if metric.endswith("distance") else 1
+                compared = _compare(ours[metric], theirs[metric], better, among=sizes[key["protocol"]])
+                rows.append({"family": family, "metric": metric} | named | compared)
     columns = ["family", "metric", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED]
     frame = pd.DataFrame(rows, columns=[name for name in columns if name != "p_holm"])
-    families = frame.groupby(["protocol", "family", "metric"])["p"]
-    frame["p_holm"] = families.transform(stats.holm) if len(frame) else pd.Series(dtype=float)
-    return frame[columns]
+    return stats.with_holm(frame, ["protocol", "family", "metric"])
 
 
 COMPARED = [
-    "difference",
-    "ci_low",
-    "ci_high",
-    "p",
-    "p_holm",
-    "improvement",
-    "improvement_low",
-    "improvement_high",
-    "seeds",
+    *("difference", "ci_low", "ci_high", "p", "p_holm", "improvement", "improvement_low", "improvement_high"),
+    *("seeds", "family_low", "family_high"),
 ]
 
 
-def _compare(
-    ours: "pd.Series[float]", theirs: "pd.Series[float]", random: np.random.Generator, better: int
-) -> dict[str, float]:
-    """One comparison of two cells' runs, indexed by seed; `better` is the sign of an improvement."""
+def _compare(ours: "pd.Series[float]", theirs: "pd.Series[float]", better: int, among: int) -> dict[str, float]:
+    """One comparison of two cells' runs, indexed by seed, `among` those of a family.
+
+    `better` is the sign of an improvement.
+    """
     ours, theirs = ours.align(theirs, join="inner")
-    found = stats.paired_comparison(ours, theirs, random)
-    chance, (low, high) = stats.probability_of_improvement(better * ours, better * theirs, random)
-    values = (*found[:4], chance, low, high, found.seeds)
+    found = stats.paired_comparison(ours, theirs)
+    family = stats.paired_comparison(ours, theirs, level=1 - (1 - stats.LEVEL) / among)
+    chance, (low, high) = stats.probability_of_improvement(better * ours, better * theirs)
+    values = (*found[:4], chance, low, high, found.seeds, family.low, family.high)
     return dict(zip([name for name in COMPARED if name != "p_holm"], values, strict=True))
 
 
 def variance_frame(runs: pd.DataFrame) -> pd.DataFrame:
-    """Variance of the success rate over the seeds of each cell: key, seeds, seed_variance, evaluation_variance."""
+    """Variance of the success rate over the seeds of each cell.
+
+    Columns: the key, seeds, seed_variance, evaluation_variance, resets_deviation. The last bounds what the intervals
+    leave out: every run meets the same resets, and other resets would move all rates of a cell together, by at most
+    the binomial error sqrt(p (1 - p) / E).
+    """
     rows = []
     for key, own in runs.groupby(KEY):
-        seed, evaluation = stats.variance_split(own["success_rate"], int(own["episodes"].median()))
+        episodes = int(own["episodes"].median())
+        seed, evaluation = stats.variance_split(own["success_rate"], episodes)
         row = dict(zip(KEY, key, strict=True)) | {"seeds": len(own)}
-        rows.append(row | {"seed_variance": seed, "evaluation_variance": evaluation})
+        row |= {"seed_variance": seed, "evaluation_variance": evaluation}
+        rate = stats.mean(own["success_rate"])
+        rows.append(row | {"resets_deviation": np.sqrt(rate * (1 - rate) / episodes) if episodes else np.nan})
     return pd.DataFrame(rows)
 
 

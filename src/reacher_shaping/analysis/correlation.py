@@ -1,13 +1,21 @@
-"""Correlations between what a cell is set to and what comes out, over cells and over runs."""
+"""Correlations between what a cell is set to and what comes out, over cells and over runs.
+
+A seed is left out of all cells at once (`stats.jackknife_error`): cells share their seeds, and a cell of the longer
+budget goes on where the same runs of the shorter one ended, so neither cells nor runs are independent. The intervals
+say how far other seeds would move r; which cells there are is the design's. The published runs have one seed and so no
+interval. Of two settings r is a constant of the design.
+"""
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from reacher_shaping import stats
 from reacher_shaping.labels import KEY
-from reacher_shaping.random_streams import generator
 
 CORRELATED = ["alpha0", "success_rate", "mean_return", "budget"]
+MEASURED = ("success_rate", "mean_return")
+LEVELS = ("cells", "runs")
 
 
 def in_table_2(frame: pd.DataFrame) -> "pd.Series[bool]":
@@ -17,24 +25,50 @@ def in_table_2(frame: pd.DataFrame) -> "pd.Series[bool]":
     return ~frame["variant"].str.fullmatch(r"decay.*_l2sq")
 
 
-def correlations(rows: pd.DataFrame, level: str, random: np.random.Generator) -> pd.DataFrame:
+def correlations(runs: pd.DataFrame, level: str) -> pd.DataFrame:
     """Full matrices (both methods) over `CORRELATED`, long form: method, x, y, r, ci_low, ci_high, n, level.
 
-    `rows` are cells, resampled as cells, unless `level` starts with "runs": then they are runs, resampled
-    inside their cells (`stats.correlation`).
+    `level` starts with "cells": the means over seeds of the cells are correlated; with "runs": the single runs. A run
+    that diverged has no value and is left out. `runs` may come from several protocols; a cell is one row or one group.
     """
-    strata = rows.groupby(KEY).ngroup().to_numpy() if level.startswith("runs") else None
+    columns, count = _columns(runs, single=level.startswith("runs"))
+    seeds = runs["seed"].nunique()
     records = []
-    for method in stats.CORRELATIONS:
+    for method, measure in stats.CORRELATIONS.items():
         for i, x in enumerate(CORRELATED):
             for y in CORRELATED[i:]:
-                r, (low, high), n = stats.correlation(rows[x], rows[y], random, method, strata)
+                values = measure(columns[x], columns[y])
+                measured = x != y and (x in MEASURED or y in MEASURED)
+                low, high = stats.fisher_interval(values, seeds) if measured else stats.NO_INTERVAL
                 pairs = [(x, y)] if x == y else [(x, y), (y, x)]
-                records += [(method, *pair, r, low, high, n, level) for pair in pairs]
+                records += [(method, *pair, float(values[0]), low, high, count, level) for pair in pairs]
     return pd.DataFrame(records, columns=["method", "x", "y", "r", "ci_low", "ci_high", "n", "level"])
 
 
-def correlation_frame(runs: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+def _columns(runs: pd.DataFrame, single: bool) -> tuple[dict[str, NDArray[np.float64]], int]:
+    """What is correlated, with all seeds and with each left out [K, N], and the number of rows N that have a value."""
+    rows = runs.assign(protocol=runs.get("protocol", ""), budget=runs["budget"].astype(float))
+    wide = rows.pivot(index="seed", columns=KEY, values=list(MEASURED))
+    weights = stats.jackknife_weights(len(wide))[:, :, None]
+    columns, known = {}, np.zeros(0)
+    for name in MEASURED:
+        values = wide[name].to_numpy(dtype=float)
+        finite = np.isfinite(values)
+        kept = np.where((weights > 0) & finite, values, np.nan)
+        if single:
+            columns[name] = kept.reshape(len(kept), -1)
+        else:
+            total = (weights * np.where(finite, values, 0.0)).sum(axis=1)
+            columns[name] = total / np.where((there := (weights * finite).sum(axis=1)) > 0, there, np.nan)
+        known = np.isfinite(columns[name][0])
+    for name in ("alpha0", "budget"):
+        setting = wide[MEASURED[0]].columns.get_level_values(name).to_numpy(dtype=float)
+        repeated = np.tile(setting, len(wide)) if single else setting
+        columns[name] = np.broadcast_to(repeated, columns[MEASURED[0]].shape)
+    return columns, int(known.sum())
+
+
+def correlation_frame(runs: pd.DataFrame) -> pd.DataFrame:
     """`correlation.csv`: the matrices of each protocol at four levels, with `protocol` as last column.
 
     | level | rows |
@@ -43,11 +77,10 @@ def correlation_frame(runs: pd.DataFrame, root_seed: int) -> pd.DataFrame:
     | runs | the single runs of those cells |
     | cells_all, runs_all | the same with the appendix's cells |
     """
-    parts = []
-    for protocol, own in runs.groupby("protocol"):
-        for suffix, chosen in (("", own[in_table_2(own)]), ("_all", own)):
-            cells = chosen.groupby(KEY, as_index=False)[["success_rate", "mean_return"]].mean()
-            for level, rows in (("cells", cells), ("runs", chosen)):
-                name = level + suffix
-                parts.append(correlations(rows, name, generator(root_seed, protocol, name)).assign(protocol=protocol))
+    parts = [
+        correlations(chosen, level + suffix).assign(protocol=protocol)
+        for protocol, own in runs.groupby("protocol")
+        for suffix, chosen in (("", own[in_table_2(own)]), ("_all", own))
+        for level in LEVELS
+    ]
     return pd.concat(parts, ignore_index=True)

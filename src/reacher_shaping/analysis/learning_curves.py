@@ -11,15 +11,18 @@ What hangs on the window is shown by `roughness_by_window`, not assumed.
 | peak_return, peak_iteration | maximum of the smoothed curve, iterations done by then | the paper sees an early peak |
 | final_return | last value of the smoothed curve | smoothed as the peak is, so the drop is never negative |
 | drop_from_peak | peak_return - final_return | "cannot hold what it learned" |
-| roughness | deviation of first differences / mean absolute return, past the first fifth | below |
+| shaking | deviation of first differences past the first fifth, in units of return | below |
+| roughness | shaking / mean absolute return past the first fifth | below |
 | area_under_curve | mean return over iterations | speed and level in one number, no threshold to choose |
 | steps_to_threshold | environment steps until the smoothed curve reaches a value; NaN if never | speed alone |
 
-Roughness. First differences remove the level and slow trends and leave the shaking from one iteration to
-the next. Their scale grows with the size of the return, and every variant at -800 would seem rough; so
-they are divided by the mean absolute return. The curve's own deviation would be the wrong divisor: a
-converged flat curve, whose deviation is sampling noise, would then be the roughest of all. The first
-fifth of training is left out, else the steep first rise (learning, not instability) would dominate.
+Shaking and roughness. First differences remove the level and slow trends and leave the shaking from one
+iteration to the next. Its scale grows with the size of the return, and every variant at -800 would seem rough;
+so roughness divides by the mean absolute return, and then moves with the return by construction: what goes
+with success beyond the return is asked of the shaking itself, within one budget. The curve's own deviation
+would be the wrong divisor: a converged flat curve, whose deviation is sampling noise, would then be the
+roughest of all. The first fifth of training is left out, else the steep first rise (learning, not
+instability) would dominate.
 """
 
 from collections.abc import Sequence
@@ -84,18 +87,31 @@ def peak(curves: ArrayLike, window: int = WINDOW) -> tuple[NDArray[np.float64], 
     return top, np.where(np.isfinite(top), smoothed.argmax(axis=1) + first, np.nan)
 
 
+def settled(curves: ArrayLike, window: int = 1) -> NDArray[np.float64]:
+    """The smoothed curve past the first fifth [S, T]."""
+    values = np.atleast_2d(np.asarray(curves, dtype=float))
+    return smooth(values[:, int(BURN_IN * values.shape[1]) :], window)
+
+
+def shaking(curves: ArrayLike, window: int = 1) -> NDArray[np.float64]:
+    """Standard deviation of first differences past the first fifth, in units of return [S].
+
+    NaN for fewer than three points or a diverged curve.
+    """
+    later = settled(curves, window)
+    if later.shape[1] < 3:
+        return np.full(later.shape[0], np.nan)
+    deviation: NDArray[np.float64] = np.diff(later, axis=1).std(axis=1, ddof=1)
+    return deviation
+
+
 def roughness(curves: ArrayLike, window: int = 1) -> NDArray[np.float64]:
-    """Standard deviation of first differences over mean absolute return, past the first fifth [S].
+    """Shaking over mean absolute return, past the first fifth [S].
 
     A pure number. NaN for fewer than three points, a diverged curve or one that is zero throughout.
     """
-    values = np.atleast_2d(np.asarray(curves, dtype=float))
-    settled = smooth(values[:, int(BURN_IN * values.shape[1]) :], window)
-    if settled.shape[1] < 3:
-        return np.full(values.shape[0], np.nan)
-    level = np.abs(settled).mean(axis=1)
-    shaking: NDArray[np.float64] = np.diff(settled, axis=1).std(axis=1, ddof=1)
-    return shaking / np.where(level > 0, level, np.nan)
+    level = np.abs(settled(curves, window)).mean(axis=1)
+    return shaking(curves, window) / np.where(level > 0, level, np.nan)
 
 
 def roughness_by_window(curves: ArrayLike, windows: Sequence[int] = WINDOWS) -> NDArray[np.float64]:
@@ -126,5 +142,6 @@ def measures(curves: ArrayLike) -> dict[str, NDArray[np.float64]]:
         "final_return": final_return,
         "drop_from_peak": peak_return - final_return,
         "roughness": roughness(values),
+        "shaking": shaking(values),
         "area_under_curve": values.mean(axis=1),
     }

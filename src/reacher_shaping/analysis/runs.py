@@ -20,15 +20,14 @@ from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.evaluation.metrics import EVALUATION, evaluation_metrics
 from reacher_shaping.labels import KEY
-from reacher_shaping.random_streams import generator
 
 Block = tuple[Mapping[str, Any], pd.DataFrame, pd.DataFrame]
-CURVE = ["peak_return", "peak_iteration", "final_return", "drop_from_peak", "roughness", "area_under_curve"]
+CURVE = ["peak_return", "peak_iteration", "final_return", "drop_from_peak", "roughness", "shaking", "area_under_curve"]
 METRICS = EVALUATION + [f"deterministic_{name}" for name in EVALUATION] + CURVE + ["steps_to_threshold", "action_std"]
 RUNS = [*KEY, "seed", "episodes", *METRICS, "diverged"]
 RATES = [name for name in METRICS if name.endswith("success_rate")]
 RADII = tuple(round(0.005 * step, 3) for step in range(1, 11))
-OVER_SEEDS = "95 % bootstrap over seeds"
+OVER_SEEDS = "95 % t over seeds"
 OVER_EPISODES = "95 % Wilson over episodes"
 # Part of the way from the start to the peak of the unshaped agent that counts as "learned" (C17).
 LEARNED = 0.8
@@ -92,20 +91,35 @@ def runs_frame(blocks: Iterable[Block]) -> pd.DataFrame:
     return runs.sort_values([*KEY, "seed"], ignore_index=True)[RUNS]
 
 
-def summarise(sample: ArrayLike, random: np.random.Generator) -> dict[str, float]:
-    """Mean over seeds [S], IQM and the interval of the mean, under the suffixes of `cells.parquet`."""
-    low, high = stats.bootstrap_interval(sample, random)
+def steps_or_budget(runs: pd.DataFrame) -> "pd.Series[float]":
+    """Steps to the threshold, a run that never gets there counted at its whole budget; missing if it diverged.
+
+    A mean over those that got there alone would make a rule look the faster the more of its runs fail.
+    """
+    counted = runs["steps_to_threshold"].fillna(runs["budget"]).astype(float)
+    return counted.where(runs["peak_return"].notna())
+
+
+def summarise(sample: ArrayLike, name: str) -> dict[str, float]:
+    """Mean over seeds [S], IQM and the t interval of the mean, under the suffixes of `cells.parquet`.
+
+    Limits of a rate or share, known by its name, end at 0 and 1.
+    """
+    low, high = stats.t_interval(sample)
+    if "rate" in name or "share" in name:
+        low, high = np.clip([low, high], 0.0, 1.0)
     return {"": stats.mean(sample), "_iqm": stats.iqm(sample), "_low": low, "_high": high}
 
 
-def _cell(runs: pd.DataFrame, root_seed: int) -> dict[str, Any]:
+def _cell(runs: pd.DataFrame) -> dict[str, Any]:
     """One row of `cells.parquet` from the runs of one cell."""
-    key = {name: runs[name].iloc[0] for name in KEY}
     single = len(runs) == 1
-    row = {**key, "seeds": len(runs), "diverged": int(runs["diverged"].sum())}
+    row = {name: runs[name].iloc[0] for name in KEY} | {"seeds": len(runs), "diverged": int(runs["diverged"].sum())}
     row["interval"] = OVER_EPISODES if single else OVER_SEEDS
     for name in METRICS:
-        summary = summarise(runs[name], generator(root_seed, *key.values(), name))
+        if name not in runs:  # runs kept from before it was measured
+            continue
+        summary = summarise(steps_or_budget(runs) if name == "steps_to_threshold" else runs[name], name)
         if single and name in RATES and np.isfinite(summary[""]):
             episodes = int(runs["episodes"].iloc[0])
             summary["_low"], summary["_high"] = stats.wilson_interval(round(summary[""] * episodes), episodes)
@@ -113,13 +127,15 @@ def _cell(runs: pd.DataFrame, root_seed: int) -> dict[str, Any]:
     return row
 
 
-def cells_frame(runs: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+def cells_frame(runs: pd.DataFrame) -> pd.DataFrame:
     """`cells.parquet`: a row per cell. For each metric M of `METRICS`: M (mean over seeds), M_iqm, M_low, M_high.
 
     `interval` says what the limits are. With one seed the success rates carry a Wilson interval over
-    episodes, which knows nothing of other seeds, and all other metrics have none (NaN).
+    episodes, which knows nothing of other seeds, and all other metrics have none (NaN). All limits are for the
+    1000 resets that every run is evaluated on; other resets would move a level by up to its binomial error
+    (`variance.parquet`) and hardly a difference between cells.
     """
-    return pd.DataFrame([_cell(cell, root_seed) for _, cell in runs.groupby(KEY, sort=True)])
+    return pd.DataFrame([_cell(cell) for _, cell in runs.groupby(KEY, sort=True)])
 
 
 def radius_frame(
@@ -141,24 +157,23 @@ def radius_frame(
     return frame.sort_values(order, ignore_index=True)[[*order, "success_rate", "final_success_rate"]]
 
 
-def over_seeds(frame: pd.DataFrame, by: Sequence[str], metrics: Sequence[str], root_seed: int) -> pd.DataFrame:
+def over_seeds(frame: pd.DataFrame, by: Sequence[str], metrics: Sequence[str]) -> pd.DataFrame:
     """A row per group of `by` with the number of `seeds`, and mean, IQM and interval over them of each metric."""
     rows = []
     for key, group in frame.groupby(list(by)):
         row = dict(zip(by, key, strict=True)) | {"seeds": len(group)}
         for name in metrics:
-            summary = summarise(group[name], generator(root_seed, *key, name))
-            row |= {name + suffix: value for suffix, value in summary.items()}
+            row |= {name + suffix: value for suffix, value in summarise(group[name], name).items()}
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def radius_cells(radius: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+def radius_cells(radius: pd.DataFrame) -> pd.DataFrame:
     """`radius_frame` over seeds: a row per cell, mode and radius."""
-    return over_seeds(radius, [*KEY, "mode", "radius"], ["success_rate", "final_success_rate"], root_seed)
+    return over_seeds(radius, [*KEY, "mode", "radius"], ["success_rate", "final_success_rate"])
 
 
-def length_cells(long_episodes: pd.DataFrame, root_seed: int) -> pd.DataFrame:
+def length_cells(long_episodes: pd.DataFrame) -> pd.DataFrame:
     """Evaluations at several episode lengths, over seeds: a row per cell, mode and length (`steps`)."""
     metrics = ["success_rate", "final_success_rate", "final_distance", "return_per_step", "share_within_radius"]
-    return over_seeds(long_episodes, [*KEY, "mode", "steps"], metrics, root_seed)
+    return over_seeds(long_episodes, [*KEY, "mode", "steps"], metrics)

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from reacher_shaping import stats
-from reacher_shaping.analysis.claim_estimates import BEST, LONG, SHAPED, SHORT, TABLE_2
+from reacher_shaping.analysis.claim_formulas import BEST, LONG, SHAPED, SHORT, TABLE_2
 from reacher_shaping.labels import CELL
 
 Array = NDArray[np.float64]

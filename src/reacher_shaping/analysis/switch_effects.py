@@ -21,9 +21,8 @@ import pandas as pd
 
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
-from reacher_shaping.analysis.correlation import CORRELATED, correlations, in_table_2
+from reacher_shaping.analysis.correlation import correlations, in_table_2
 from reacher_shaping.labels import KEY
-from reacher_shaping.random_streams import generator
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.parts import Switches
 
@@ -39,9 +38,7 @@ def unit_return(runs: pd.DataFrame, protocols: Mapping[str, Protocol]) -> "pd.Se
     return runs["reward_distance"] + runs["reward_control"] / weight.where(weight > 0)
 
 
-def effects_frame(
-    runs: pd.DataFrame, switches: Switches, protocols: Mapping[str, Protocol], root_seed: int
-) -> pd.DataFrame:
+def effects_frame(runs: pd.DataFrame, switches: Switches, protocols: Mapping[str, Protocol]) -> pd.DataFrame:
     """A row per variant, switch, effect and metric.
 
     Columns: variant, switch, setting (its values at start and end), effect, metric, difference, ci_low, ci_high, p,
@@ -58,8 +55,7 @@ def effects_frame(
         for metric in EFFECT_METRICS:
             parts = [sign * by_cell[key][metric] for key, sign in keys.items()]
             values = pd.concat(parts, axis=1, join="inner").sum(axis=1, skipna=False)
-            random = generator(root_seed, variant, switch, effect, metric)
-            found = stats.paired_comparison(values, np.zeros(len(values)), random)
+            found = stats.paired_comparison(values, np.zeros(len(values)))
             named = {"variant": variant, "switch": switch, "setting": _setting(switch, switches, protocols)}
             rows.append({**named, "effect": effect, "metric": metric} | found._asdict())
     frame = pd.DataFrame(rows, columns=["variant", "switch", "setting", "effect", "metric", *stats.Comparison._fields])
@@ -106,7 +102,7 @@ def logs_frame(progress: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str, root_seed: int) -> pd.DataFrame:
+def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str) -> pd.DataFrame:
     """Correlations over all cells of an experiment, whatever their protocol, in the form of `correlation.csv`.
 
     Levels: `cells` and `runs` are the paper's main table, so without the appendix's variants and a baseline labelled
@@ -114,18 +110,10 @@ def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str, ro
     reported; and `published`, the paper's own table (`published` comes from `paper_tables.published_cells`).
     """
     labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
-    kept, theirs = runs[in_table_2(runs) & ~labelled], published[in_table_2(published)]
-    levels = {"cells": _means(kept), "runs": kept, "cells_all": _means(runs), "published": theirs}
-    parts = [correlations(rows, level, generator(root_seed, name, level)) for level, rows in levels.items()]
-    for seed, rows in kept.groupby("seed"):
-        pairs = [(method, x, y) for method in stats.CORRELATIONS for x in CORRELATED for y in CORRELATED]
-        values = [
-            (method, x, y, float(stats.CORRELATIONS[method](*(rows[c].to_numpy(dtype=float) for c in (x, y)))))
-            for method, x, y in pairs
-        ]
-        parts.append(pd.DataFrame(values, columns=["method", "x", "y", "r"]).assign(n=len(rows), level=f"seed{seed}"))
-    return pd.concat(parts, ignore_index=True).assign(protocol=name)
-
-
-def _means(runs: pd.DataFrame) -> pd.DataFrame:
-    return runs.groupby(KEY, as_index=False)[["success_rate", "mean_return"]].mean()
+    kept = runs[in_table_2(runs) & ~labelled]
+    levels = {"cells": kept, "runs": kept, "cells_all": runs}
+    levels["published"] = published[in_table_2(published)].assign(seed=0)
+    levels |= {f"seed{seed}": rows for seed, rows in kept.groupby("seed")}
+    return pd.concat([correlations(rows, level) for level, rows in levels.items()], ignore_index=True).assign(
+        protocol=name
+    )

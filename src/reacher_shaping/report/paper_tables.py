@@ -96,7 +96,7 @@ def behaviour(cells: pd.DataFrame, protocol: str | None = None) -> pd.DataFrame:
 
 def learning(cells: pd.DataFrame, runs: pd.DataFrame, protocol: str | None = None) -> pd.DataFrame:
     """How every cell learns: as `behaviour`, with the measures of `LEARNING` and `reached`, the number of runs that
-    reach the threshold, over which `steps_to_threshold` is a mean.
+    reach the threshold; the others count at their whole budget in `steps_to_threshold`.
     """
     table = _measured(of_protocol(cells, protocol), LEARNING)
     if "steps_to_threshold" in table:

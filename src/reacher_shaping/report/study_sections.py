@@ -184,13 +184,8 @@ def agreement_sentence(agreement: pd.DataFrame) -> str:
 def shaping_sentence(shaped: pd.DataFrame) -> str:
     """In how many comparisons a shaped cell differs from `none` beyond chance, measure by measure."""
     measured, only = corrected(shaped, SHAPING), only_cell(shaped)
-    family = measured.groupby(["protocol", "metric"]).size().max()
-    seeds = int(shaped["seeds"].max())
-    if (
-        2.0 ** (1 - seeds) * (len(measured) if only else family) > LEVEL
-    ):  # the smallest p of a sign-flip test, corrected
-        cells = say("study_sentences.shaping_only") if only else say("study_sentences.shaping_cells", count=family)
-        return say("study_sentences.shaping_few", seeds=seeds, cells=cells)
+    if not measured["p_holm"].notna().any():
+        return say("study_sentences.shaping_few")
     if only:
         return _only_cell_sentence(measured)
     parts = []

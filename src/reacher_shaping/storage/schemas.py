@@ -15,19 +15,30 @@ CURVES = Table(
     | {"seeds": INTEGER},
     optional=frozenset({"episode_return", "low", "high"}),
 )
+_NUMBERS = {"published", "measured", "ci_low", "ci_high", "replication", "power", "refuted_if_true"}
+_WORTH = {"dated": TEXT, "replication": NUMBER, "interval_verdict": TEXT, "seeds_to_decide": NUMBER}
+_WORTH |= {"family_verdict": TEXT, "power": NUMBER, "refuted_if_true": NUMBER, "published_holds": NUMBER}
 CLAIMS = Table(
     {"id": TEXT, "claim": TEXT, "published": NUMBER, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER}
-    | {"test": TEXT, "verdict": TEXT},
-    optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
+    | {"test": TEXT, "verdict": TEXT, **_WORTH, "first_dated": TEXT, "first_verdict": TEXT},
+    optional=frozenset(_NUMBERS | {"seeds_to_decide", "published_holds"}),
 )
 CLAIM_PARTS = Table(
     {"id": TEXT, "part": TEXT, "published": NUMBER, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER}
-    | {"seeds": INTEGER, "rule": TEXT, "verdict": TEXT},
-    optional=frozenset({"published", "measured", "ci_low", "ci_high"}),
+    | {"seeds": INTEGER, "rule": TEXT, "verdict": TEXT, "dated": TEXT, "current": FLAG, "family_low": NUMBER}
+    | {"family_high": NUMBER, "family_verdict": TEXT, "replication": NUMBER, "power": NUMBER, "refuted_if_true": NUMBER}
+    | dict.fromkeys(("holds_above", "holds_below", "refuted_below", "refuted_above"), NUMBER),
+    optional=frozenset(_NUMBERS | {"family_low", "family_high"}),
+)
+FAMILY_ERROR = Table({"reading": TEXT, "level": NUMBER, "estimates": INTEGER, "worst": NUMBER})
+SENSITIVITY = Table(
+    {"id": TEXT, "choice": TEXT, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER, "verdict": TEXT},
+    optional=frozenset({"measured", "ci_low", "ci_high"}),
 )
 CONTROLLERS = Table({"protocol": TEXT, "controller": TEXT, "mode": TEXT, "episodes": INTEGER}, measures=True)
 ALL_LONG_EPISODES = Table({**_CELL, **LENGTH}, measures=True)
 LENGTHS = Table({**_CELL, "mode": TEXT, "steps": INTEGER, "seeds": INTEGER}, measures=True)
+RUN_RADII = Table({**_CELL, "seed": INTEGER, "mode": TEXT, "radius": NUMBER}, measures=True)
 RADII = Table({**_CELL, "mode": TEXT, "radius": NUMBER, "seeds": INTEGER}, measures=True)
 COMPARISONS = Table(
     {"family": TEXT, "metric": TEXT, **_CELL, "other_variant": TEXT, "other_budget": INTEGER, "other_alpha0": NUMBER}

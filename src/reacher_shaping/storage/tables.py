@@ -97,12 +97,21 @@ STUDY_TABLES = {
     ),
     "claims": Entry("claims.csv", schemas.CLAIMS, "a claim of the paper", "judge_claims", REPORT),
     "claim_parts": Entry("claim_parts.csv", schemas.CLAIM_PARTS, "an estimate behind a claim", "judge_claims", REPORT),
+    "family_error": Entry(
+        "family_error.csv", schemas.FAMILY_ERROR, "a way of reading the estimates of the claims", "judge_claims"
+    ),
+    "sensitivity": Entry(
+        "sensitivity.csv", schemas.SENSITIVITY, "a claim and a choice of the analysis", "judge_claims"
+    ),
     "controllers": Entry(
         "controllers.parquet",
         schemas.CONTROLLERS,
         "a policy that needs no learning, and a mode",
         "evaluate_controllers",
-        ("plot_figures", "plot_further", *REPORT),
+        ("judge_claims", "plot_figures", "plot_further", *REPORT),
+    ),
+    "run_radii": Entry(
+        "run_radii.parquet", schemas.RUN_RADII, "a run, mode and success radius", "summarise_episodes", always=False
     ),
     "radii": Entry(
         "radii.parquet",
