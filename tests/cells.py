@@ -8,6 +8,9 @@ VARIANTS = {
     "none": Variant(name="none", potential="none"),
     "l2": Variant(name="l2", potential="l2"),
     "l2sq": Variant(name="l2sq", potential="l2sq"),
+    "exponential": Variant(name="exponential", potential="l2", schedule="exponential", horizon=300),
+    "cosine": Variant(name="cosine", potential="l2", schedule="cosine", horizon=300),
+    "success": Variant(name="success", potential="l2", schedule="success", rate=0.2),
     "decay": Variant(name="decay", potential="l2", schedule="linear", horizon=3000),
 }
 

@@ -4,6 +4,7 @@ One Gymnasium environment stepped 2048 times, one seed, one torch.nn network, au
 engine is used but its settings and its random streams, so that both meet the same resets, noise and shuffles. Slow.
 """
 
+import math
 from dataclasses import dataclass
 
 import gymnasium
@@ -114,6 +115,9 @@ def collect(env, network, cell, seed, iteration):
         applied = action.clamp(-1, 1) if cell.protocol.environment.clip_actions else action
         distance = np.linalg.norm(state[8:])
         following, reward, _, truncated, _ = env.step(applied[0].numpy())
+        if cell.protocol.environment.reward == "sparse":
+            near = np.linalg.norm(following[8:]) <= cell.protocol.environment.success_radius
+            reward = near - cell.protocol.environment.control_weight * np.square(applied[0].numpy()).sum()
         end = truncated or step == steps - 1
         next_value = network(torch.from_numpy(following).float()[None])[1]
         rows.append(
@@ -133,7 +137,11 @@ def shaped_rewards(recording, cell, iteration):
     start = 1.0 if settings.alpha0 == "label" else cell.alpha0
 
     def alpha(t):
-        return start if variant.horizon is None else start * max(0.0, 1 - t / variant.horizon)
+        if variant.schedule == "exponential":
+            return start * math.exp(-t / variant.horizon)
+        if variant.schedule == "cosine":
+            return start * (1 + math.cos(math.pi * min(1.0, t / variant.horizon))) / 2
+        return start if variant.schedule == "constant" else start * max(0.0, 1 - t / variant.horizon)
 
     rewards = []
     for n, reward in enumerate(recording.reward):

@@ -61,5 +61,5 @@ TASK = Task(
     control=control,
     observe=observe,
     rewards={"dense": dense},
-    bounds=Bounds(distance=np.inf, highest_return=0.0),
+    bounds=Bounds(distance=np.inf, highest_return={"dense": 0.0}),
 )

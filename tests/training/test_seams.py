@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from cells import small
 from toys import point_mass
 
 from reacher_shaping.evaluation.evaluate import evaluate
@@ -127,3 +128,18 @@ def test_the_state_of_a_weight_survives_a_checkpoint(tmp_path):
     resumed = trained(cell, [0, 1], state=kept, radius=0.15)
     assert torch.equal(resumed.rows, whole.rows)
     pd.testing.assert_frame_equal(resumed.progress_frame(), whole.progress_frame(), check_exact=True)
+
+
+def test_the_success_schedule_is_one_less_the_moving_average_of_each_seeds_success(tmp_path):
+    cell = small("success", alpha0=50.0, iterations=5)
+    state = trained(cell, [0, 1], radius=0.15)
+    average = np.zeros(2)
+    for success, alpha in zip(state.progress["success_rate"].T, state.progress["alpha"].T, strict=True):
+        np.testing.assert_allclose(alpha, 50 * (1 - average), rtol=1e-12)
+        average += 0.2 * (success - average)
+    assert average.min() > 0
+    path = tmp_path / "key" / "checkpoint.pt"
+    save_checkpoint(path, trained(cell, [0, 1], radius=0.15, iterations=3))
+    resumed = trained(cell, [0, 1], state=load_checkpoint(path)[0], radius=0.15)
+    assert torch.equal(resumed.rows, state.rows)
+    pd.testing.assert_frame_equal(resumed.progress_frame(), state.progress_frame(), check_exact=True)

@@ -13,6 +13,7 @@ from cells import cell, small
 from reacher_shaping.training.train import train
 
 RADIUS = 0.02
+SPARSE = {"reward": "sparse", "success_radius": 0.15, "control_weight": 0.1}
 
 
 def trained(of, seeds, state=None, iterations=None):
@@ -53,6 +54,9 @@ def weight_error(state, of, seed, network):
         small("none", networks="separate", initial_log_std=-1.0, learning_rate_schedule="linear"),
         small("l2", networks="separate", initialisation="orthogonal", advantage_normalisation="minibatch"),
         small("none", initialisation="orthogonal", hidden_units=16),
+        small("l2", alpha0=50.0, environment=SPARSE, shaping={"episode_end": "bootstrap"}, rollout_steps=1536),
+        small("exponential", alpha0=50.0, environment=SPARSE, shaping={"terminal_potential": "zero"}),
+        small("cosine", alpha0=50.0),
     ],
     ids=[
         "none",
@@ -70,6 +74,9 @@ def weight_error(state, of, seed, network):
         "separate",
         "standard",
         "orthogonal",
+        "sparse",
+        "exponential",
+        "cosine",
     ],
 )
 def test_three_iterations_equal_the_plain_loop(of):
@@ -77,7 +84,8 @@ def test_three_iterations_equal_the_plain_loop(of):
 
     Two seeds in the engine, one of them by the plain loop.
     """
-    for state, (network, recording) in zip(train(of, [4, 1], radius=RADIUS), plain_loop.train(of, 1), strict=True):
+    radius = of.protocol.environment.radius(RADIUS)
+    for state, (network, recording) in zip(train(of, [4, 1], radius=radius), plain_loop.train(of, 1), strict=True):
         error = weight_error(state, of, 1, network)
         assert error < 2e-5
         assert error < 0.01 * moved(network, of, 1)

@@ -23,3 +23,8 @@ def block_cells(cells, seeds):
 def protocols_of(cells, seeds=None):
     """The settings of the cells' protocols, each once."""
     return as_json(list({cell.protocol.name: cell.protocol.model_dump() for cell in cells}.values()))
+
+
+def evaluation_of(cell):
+    """How a cell's policies are evaluated: as the study says, at the cell's own success radius."""
+    return as_json(STUDY.evaluation.model_dump() | {"radius": STUDY.radius_of(cell)})

@@ -16,9 +16,9 @@ rule evaluate_block:
     resources:
         mem_mb=1000,
     params:
-        evaluation=as_json(STUDY.evaluation.model_dump()),
+        evaluation=lambda wildcards: evaluation_of(CELLS[wildcards.cell]),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
-        root_seed=STUDY.root_seed,
+        root_seed=lambda wildcards: CELLS[wildcards.cell].root_seed,
         code=lambda wildcards: code("evaluate_block", CELLS[wildcards.cell].chosen_code[:1]),
     script:
         "../scripts/evaluate_block.py"
@@ -35,9 +35,9 @@ rule evaluate_long:
         "results/benchmarks/{cell}/{block}/evaluate_long.tsv"
     threads: 1
     params:
-        evaluation=as_json(STUDY.evaluation.model_dump()),
+        evaluation=lambda wildcards: evaluation_of(CELLS[wildcards.cell]),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
-        root_seed=STUDY.root_seed,
+        root_seed=lambda wildcards: CELLS[wildcards.cell].root_seed,
         code=lambda wildcards: code("evaluate_long", CELLS[wildcards.cell].chosen_code[:1]),
     script:
         "../scripts/evaluate_long.py"

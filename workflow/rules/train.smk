@@ -29,7 +29,7 @@ rule train_block:
     params:
         cell=lambda wildcards: as_json(CELLS[wildcards.cell].settings()),
         seeds=lambda wildcards: list(SEEDS[wildcards.block]),
-        radius=STUDY.evaluation.radius,
+        radius=lambda wildcards: STUDY.radius_of(CELLS[wildcards.cell]),
         code=lambda wildcards: code("train_block", CELLS[wildcards.cell].chosen_code),
     script:
         "../scripts/train_block.py"

@@ -27,7 +27,9 @@ kept = Path("results/.checkpoints") / f"search-{hashlib.sha256(json.dumps(settin
 def measure(values: search.Values) -> search.Values:
     """Train and evaluate one trial."""
     cell = spec.cell(protocol, variant, values)
-    return search.score(cell, spec.seeds, episodes=evaluation.episodes, radius=evaluation.radius)
+    return search.score(
+        cell, spec.seeds, episodes=evaluation.episodes, radius=cell.protocol.environment.radius(evaluation.radius)
+    )
 
 
 with logged(snakemake.log[0]) as say:

@@ -66,7 +66,7 @@ def evaluate(
             control[..., t] = environment.control_weight * control_cost(action)
         chunks.append((measured, control))
     measured, control = (np.concatenate(parts, axis=1)[:, :episodes] for parts in zip(*chunks, strict=True))
-    reward = task.rewards["dense"](measured, 0.0, control_weight=0.0, success_radius=radius)
+    reward = task.rewards[environment.reward](measured, 0.0, control_weight=0.0, success_radius=radius)
     return _rows(reward, control, measured[..., 0], seeds, mode, radius)
 
 

@@ -27,15 +27,33 @@ else:  # what there is, read from the code without running it
     ScheduleName = Literal[defined_names("training.schedules")]
 
 
+DECAYING = ("linear", "exponential", "cosine")
+"""Schedules of a horizon."""
+ADAPTIVE = ("success",)
+"""Schedules of a rate."""
+
+
 class Environment(Settings):
-    """The task, the weight of its control cost, and whether actions are clipped to [-1, 1]."""
+    """The task and its reward, the weight of the control cost, and whether actions are clipped to [-1, 1].
+
+    `success_radius` in m is the distance to the goal that counts as success, also for the sparse reward; None for the
+    evaluation's.
+    """
 
     task: TaskName = Field("reacher", exclude_if=lambda task: task == "reacher")
     """What is simulated, observed and rewarded; a file of `tasks/`."""
+    reward: Literal["dense", "sparse"] = Field("dense", exclude_if=lambda reward: reward == "dense")
+    """Less the distance to the goal, or 1 within `success_radius` of it; both less the control cost."""
+    success_radius: Positive | None = Field(None, exclude_if=lambda radius: radius is None)
+    """Distance to the goal in m that counts as success; without it the evaluation's `radius`."""
     control_weight: NonNegative = 0.1
     """Reward taken per squared unit of action."""
     clip_actions: bool = False
     """Whether actions are clipped to [-1, 1] before they are applied and charged."""
+
+    def radius(self, default: float) -> float:
+        """Return the distance to the goal in m that counts as success, where `default` is the evaluation's."""
+        return self.success_radius or default
 
 
 class PPO(Settings):
@@ -130,9 +148,24 @@ class Protocol(Settings):
     log: Log = Log()
     """The protocol's own training log."""
 
+    @model_validator(mode="after")
+    def _sparse_is_not_dense_by_a_leak(self) -> Self:
+        shaping = self.shaping
+        leaks = shaping.episode_end == "terminal" and shaping.terminal_potential == "keep"
+        if self.environment.reward == "sparse" and leaks:
+            raise ValueError(
+                "shaping.terminal_potential = 'keep' with episode_end = 'terminal' leaves the last potential in the "
+                "return, a dense reward under environment.reward = 'sparse'; allowed: terminal_potential = 'zero', or "
+                "episode_end = 'bootstrap'"
+            )
+        return self
+
 
 class Variant(Settings):
-    """One shaping rule: a potential and the schedule of its weight; `horizon` is in environment steps."""
+    """One shaping rule: a potential and the schedule of its weight.
+
+    `horizon` is in environment steps; `rate` is what an adaptive schedule moves by in an iteration.
+    """
 
     name: Name
     potential: PotentialName
@@ -140,14 +173,20 @@ class Variant(Settings):
     schedule: ScheduleName = "constant"
     """The weight stays, or goes down in a line to 0 at `horizon`."""
     horizon: Count | None = None
-    """Environment steps until a linear schedule is at 0."""
+    """Environment steps until a decay is at 0, or at 1 / e where it is exponential."""
+    rate: Annotated[float, Field(gt=0, le=1)] | None = Field(None, exclude_if=lambda rate: rate is None)
+    """How far an adaptive weight moves in an iteration."""
 
     @model_validator(mode="after")
     def _schedule_is_complete(self) -> Self:
-        if self.schedule == "linear" and self.horizon is None:
-            raise ValueError("horizon is missing; schedule = 'linear' needs a number of environment steps >= 1")
-        if self.schedule == "constant" and self.horizon is not None:
-            raise ValueError(f"horizon = {self.horizon} has no meaning with schedule = 'constant'; leave it out")
+        needs = {"horizon": self.schedule in DECAYING, "rate": self.schedule in ADAPTIVE}
+        units = {"horizon": "a number of environment steps >= 1", "rate": "a number in (0, 1]"}
+        for name, needed in needs.items():
+            value = getattr(self, name)
+            if needed and value is None:
+                raise ValueError(f"{name} is missing; schedule = {self.schedule!r} needs {units[name]}")
+            if not needed and value is not None:
+                raise ValueError(f"{name} = {value} has no meaning with schedule = {self.schedule!r}; leave it out")
         if (self.name == "none") != (self.potential == "none"):
             raise ValueError(
                 f"potential = {self.potential!r} does not go with the name {self.name!r}: "

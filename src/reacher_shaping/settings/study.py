@@ -219,6 +219,10 @@ class Study(Settings):
         except ValidationError as error:
             raise ValueError(f"{where}.{first_problem(error)}".replace("..", ".")) from None
 
+    def radius_of(self, cell: Cell) -> float:
+        """Return the distance to the goal in m that counts as success for a cell."""
+        return cell.protocol.environment.radius(self.evaluation.radius)
+
     def blocks(self, seeds: int | None = None) -> tuple[range, ...]:
         """Consecutive ranges of run seeds that train together; more seeds leave every full block as it is.
 

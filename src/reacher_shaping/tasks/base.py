@@ -36,8 +36,8 @@ class Bounds(NamedTuple):
 
     distance: float
     """m; no goal can be farther away."""
-    highest_return: float
-    """No episode's own dense return is above it."""
+    highest_return: Mapping[str, float]
+    """No episode's return is above it, by reward."""
 
 
 @dataclass(frozen=True)

@@ -201,7 +201,7 @@ def prepare(
     whole episode.
     """
     settings, plan, environment = cell.protocol.ppo, state.plan, cell.protocol.environment
-    reward = task.rewards["dense"](
+    reward = task.rewards[environment.reward](
         rollout.measured[..., 1:, :], rollout.control, control_weight=environment.control_weight, success_radius=radius
     )
     extra = rule.reward(rollout.distance, plan.order + state.iteration * plan.steps, plan.ends, state.schedule)
