@@ -36,5 +36,6 @@ def test_the_studies_of_the_configuration_have_theirs():
         "attribution": ["cells", "effects"],
         "standard": ["cells", "log", "forest"],
         "tuned": ["cells", "log"],
+        "sparse": ["cells", "log", "forest"],
         "ablation": ["cells", "effects"],
     }

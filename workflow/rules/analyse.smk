@@ -99,7 +99,8 @@ rule check_results:
         cells=[cell.key for cell in STUDY.cells],
         seeds=STUDY.seeds,
         episodes=STUDY.evaluation.episodes,
-        code=code("check_results"),
+        protocols=protocols_of(STUDY.cells),
+        code=code("check_results", tasks_of(STUDY.cells)),
     script:
         "../scripts/check_results.py"
 

@@ -28,3 +28,8 @@ def protocols_of(cells, seeds=None):
 def evaluation_of(cell):
     """How a cell's policies are evaluated: as the study says, at the cell's own success radius."""
     return as_json(STUDY.evaluation.model_dump() | {"radius": STUDY.radius_of(cell)})
+
+
+def tasks_of(cells):
+    """The tasks that a script looks up by name for these cells, as `code` takes them."""
+    return tuple(sorted({cell.chosen_code[0] for cell in cells}))

@@ -55,6 +55,6 @@ rule evaluate_controllers:
         evaluation=as_json(STUDY.evaluation.model_dump()),
         protocols=protocols_of(STUDY.cells),
         root_seed=STUDY.root_seed,
-        code=code("evaluate_controllers"),
+        code=code("evaluate_controllers", tasks_of(STUDY.cells)),
     script:
         "../scripts/evaluate_controllers.py"

@@ -35,8 +35,8 @@ use rule evaluate_controllers as evaluate_experiment_controllers with:
     params:
         evaluation=as_json(STUDY.evaluation.model_dump()),
         protocols=of_experiment(protocols_of),
-        root_seed=STUDY.root_seed,
-        code=code("evaluate_controllers"),
+        root_seed=of_experiment(lambda cells, seeds: cells[0].root_seed),
+        code=of_experiment(lambda cells, seeds: code("evaluate_controllers", tasks_of(cells))),
 
 
 use rule train_peer as train_experiment_peer with:
@@ -54,7 +54,7 @@ use rule train_peer as train_experiment_peer with:
         protocol=of_experiment(lambda cells, seeds: as_json(cells[0].protocol.model_dump())),
         evaluation=as_json(STUDY.evaluation.model_dump()),
         root_seed=STUDY.root_seed,
-        code=code("train_peer"),
+        code=of_experiment(lambda cells, seeds: code("train_peer", tasks_of(cells))),
 
 
 use rule check_results as check_experiment with:
@@ -71,7 +71,8 @@ use rule check_results as check_experiment with:
         cells=of_experiment(lambda cells, seeds: [cell.key for cell in cells]),
         seeds=of_experiment(lambda cells, seeds: seeds),
         episodes=STUDY.evaluation.episodes,
-        code=code("check_results"),
+        protocols=of_experiment(protocols_of),
+        code=of_experiment(lambda cells, seeds: code("check_results", tasks_of(cells))),
 
 
 rule summarise_experiment:

@@ -30,7 +30,7 @@ rule train_peer:
         protocol=as_json(STUDY.cells[0].protocol.model_dump()),
         evaluation=as_json(STUDY.evaluation.model_dump()),
         root_seed=STUDY.root_seed,
-        code=code("train_peer"),
+        code=code("train_peer", tasks_of(STUDY.cells)),
     script:
         "../scripts/train_peer.py"
 

@@ -1,6 +1,7 @@
 # The search for the settings of the protocol `tuned`, an optional target: `snakemake search`. Nothing else depends on it:
 # what it found stands in config.yaml.
 if STUDY.search:
+    SEARCHED = STUDY.search.cell(STUDY.protocols[STUDY.search.protocol], STUDY.variants[STUDY.search.variant], {})
 
     rule search:
         output:
@@ -17,6 +18,6 @@ if STUDY.search:
             protocol=as_json(STUDY.protocols[STUDY.search.protocol].model_dump()),
             variant=as_json(STUDY.variants[STUDY.search.variant].model_dump()),
             evaluation=as_json(STUDY.evaluation.model_dump()),
-            code=code("search"),
+            code=code("search", SEARCHED.chosen_code),
         script:
             "../scripts/search.py"

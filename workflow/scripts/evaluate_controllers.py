@@ -21,7 +21,7 @@ with logged(snakemake.log[0]):
     rows = [
         evaluate_controllers(
             episodes=evaluation.episodes,
-            radius=evaluation.radius,
+            radius=protocol.environment.radius(evaluation.radius),
             environment=protocol.environment,
             network=protocol.ppo,
             root_seed=params.root_seed,

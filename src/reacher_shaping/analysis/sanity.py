@@ -1,7 +1,7 @@
-"""What the results of any study must satisfy: complete, finite unless diverged, within what Reacher-v5 allows."""
+"""What the results of any study must satisfy: complete, finite unless diverged, within what their task allows."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -9,15 +9,28 @@ from reacher_shaping.labels import KEY
 
 RATES = ["success_rate", "final_success_rate", "deterministic_success_rate", "deterministic_final_success_rate"]
 DISTANCES = ["final_distance", "min_distance"]
-REACH = 0.5  # m; more than the arm's 0.21 plus the farthest target's 0.28
+
+
+class Limits(NamedTuple):
+    """What the results of a protocol must keep to: greatest distance in m, highest mean return."""
+
+    distance: float
+    mean_return: float
 
 
 def problems(
-    runs: pd.DataFrame, cells: pd.DataFrame, expected: Sequence[Mapping[str, Any]], *, seeds: int, episodes: int
+    runs: pd.DataFrame,
+    cells: pd.DataFrame,
+    expected: Sequence[Mapping[str, Any]],
+    *,
+    seeds: int,
+    episodes: int,
+    limits: Mapping[str, Limits],
 ) -> list[str]:
     """What is wrong with the tables of runs and cells, one line each; empty if nothing is.
 
-    expected: key columns of each cell of the study; seeds: runs of each; episodes: evaluation episodes of each run.
+    expected: key columns of each cell of the study; seeds: runs of each; episodes: evaluation episodes of each run;
+    limits: by protocol.
     """
     found = []
     wanted = pd.MultiIndex.from_tuples(
@@ -32,9 +45,11 @@ def problems(
     found += _offending(runs, runs["episodes"] != episodes, f"has not {episodes} episodes")
     for name in RATES:
         found += _offending(sound, ~sound[name].between(0, 1), f"has {name} outside [0, 1]")
-    for name in DISTANCES:
-        found += _offending(sound, ~sound[name].between(0, REACH), f"has {name} outside [0, {REACH}] m")
-    found += _offending(sound, ~(sound["mean_return"] < 0), "has a mean return that is not negative")
+    for protocol, (distance, mean_return) in limits.items():
+        own = sound[sound["protocol"] == protocol]
+        for name in DISTANCES:
+            found += _offending(own, ~own[name].between(0, distance), f"has {name} outside [0, {distance:g}] m")
+        found += _offending(own, ~(own["mean_return"] <= mean_return), f"has a mean return above {mean_return:g}")
     found += _offending(
         sound, sound["success_rate"] < sound["final_success_rate"], "succeeds more often at the end than ever"
     )

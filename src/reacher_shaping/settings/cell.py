@@ -34,11 +34,7 @@ ADAPTIVE = ("success",)
 
 
 class Environment(Settings):
-    """The task and its reward, the weight of the control cost, and whether actions are clipped to [-1, 1].
-
-    `success_radius` in m is the distance to the goal that counts as success, also for the sparse reward; None for the
-    evaluation's.
-    """
+    """The task and its reward, the weight of the control cost, and whether actions are clipped to [-1, 1]."""
 
     task: TaskName = Field("reacher", exclude_if=lambda task: task == "reacher")
     """What is simulated, observed and rewarded; a file of `tasks/`."""
@@ -162,10 +158,7 @@ class Protocol(Settings):
 
 
 class Variant(Settings):
-    """One shaping rule: a potential and the schedule of its weight.
-
-    `horizon` is in environment steps; `rate` is what an adaptive schedule moves by in an iteration.
-    """
+    """One shaping rule: a potential and the schedule of its weight."""
 
     name: Name
     potential: PotentialName

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from reacher_shaping.settings.base import WHOLE, Count, Name, Positive, Settings
+from reacher_shaping.settings.base import WHOLE, Count, Name, Positive, Seed, Settings
 from reacher_shaping.settings.cell import Alpha0
 
 
@@ -34,8 +34,8 @@ class Peers(Settings):
 class Row(Settings):
     """One row of the grid: every variant x budget x alpha0, with optional changes to the protocol's settings."""
 
-    protocol: Name = "paper"
-    """Name of the protocol the cells are trained under."""
+    protocol: Name | Annotated[tuple[Name, ...], Field(min_length=1)] = "paper"
+    """Name of the protocol that the cells are trained under, or several: the cells once under each."""
     variants: Annotated[tuple[Name, ...], Field(min_length=1)]
     """Names of variants."""
     budgets: Annotated[tuple[Count, ...], Field(min_length=1)]
@@ -55,7 +55,7 @@ class Row(Settings):
 
     @model_validator(mode="before")
     @classmethod
-    def _liststo_tuples(cls, data: Any) -> Any:
+    def _lists_to_tuples(cls, data: Any) -> Any:
         return {key: to_tuple(value) for key, value in data.items()} if isinstance(data, Mapping) else data
 
 
@@ -102,6 +102,8 @@ class Experiment(Settings):
     """What the study asks, as the report introduces it."""
     seeds: Annotated[int, Field(ge=1, le=10**5), WHOLE]
     """Runs of each cell."""
+    root_seed: Seed | None = Field(None, exclude_if=lambda root: root is None)
+    """Root of the study's own random streams, so that its runs share none with others; without it the main study's."""
     grid: Annotated[tuple[Row, ...], BeforeValidator(to_tuple)] = ()
     """Rows of cells."""
     switches: Switches | None = None

@@ -164,8 +164,10 @@ class Study(Settings):
 
     def _experiment_cells(self, name: str, experiment: Experiment) -> tuple[Cell, ...]:
         cells = self._cells_of_rows(f"experiments.{name}.grid", experiment.grid)
-        switches = experiment.switches
-        return cells if switches is None else cells + self._switched_cells(switches, f"experiments.{name}.switches")
+        switches, root = experiment.switches, experiment.root_seed
+        if switches is not None:
+            cells += self._switched_cells(switches, f"experiments.{name}.switches")
+        return cells if root is None else tuple(cell.model_copy(update={"root_seed": root}) for cell in cells)
 
     def _switched_cells(self, switches: Switches, where: str) -> tuple[Cell, ...]:
         for key, value in (("start", switches.start), ("end", switches.end)):
@@ -202,12 +204,17 @@ class Study(Settings):
         )
 
     def _cells_of_rows(self, where: str, rows: tuple[Row, ...]) -> tuple[Cell, ...]:
-        return tuple(cell for number, row in enumerate(rows) for cell in self._cells_of(f"{where}.{number}", row))
+        return tuple(
+            cell
+            for number, row in enumerate(rows)
+            for protocol in ([row.protocol] if isinstance(row.protocol, str) else row.protocol)
+            for cell in self._cells_of(f"{where}.{number}", row, protocol)
+        )
 
-    def _cells_of(self, where: str, row: Row) -> list[Cell]:
-        if row.protocol not in self.protocols:
-            raise ValueError(f"{where}.protocol = {row.protocol!r} is unknown; allowed: {', '.join(self.protocols)}")
-        protocol = self.protocols[row.protocol].model_dump()
+    def _cells_of(self, where: str, row: Row, name: str) -> list[Cell]:
+        if name not in self.protocols:
+            raise ValueError(f"{where}.protocol = {name!r} is unknown; allowed: {', '.join(self.protocols)}")
+        protocol = self.protocols[name].model_dump()
         for part in ("environment", "ppo", "shaping", "log"):
             protocol[part] |= getattr(row, part)
         try:
