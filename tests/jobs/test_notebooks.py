@@ -50,7 +50,7 @@ def study(tmp_path_factory):
     write_table(results / "radii.parquet", radii, schemas.RADII)
     write_table(results / "lengths.parquet", lengths, schemas.LENGTHS)
     (folder / "published").mkdir()
-    for name in ("table2.csv", "table3.csv"):
+    for name in ("table2.csv", "table3.csv", "left_out.csv", "training_logs.csv"):
         (folder / "published" / name).write_bytes((synthetic.PUBLISHED / name).read_bytes())
     return folder
 
