@@ -134,7 +134,7 @@ def shaped_rewards(recording, cell, iteration):
     name = "l2sq" if variant.horizon and settings.decay_potential == "l2sq" else variant.potential
     potential = {"none": lambda d: 0.0, "l2": lambda d: -d, "l2sq": lambda d: -d * d}[name]
     discount = cell.protocol.ppo.discount
-    start = 1.0 if settings.alpha0 == "label" else cell.alpha0
+    start = 1.0 if settings.start_weight == "one" else cell.alpha0
 
     def alpha(t):
         if variant.schedule == "exponential":

@@ -124,7 +124,7 @@ def test_each_switch_is_turned_alone_and_taken_back_alone():
     # D5 to D7 are no switches: they change no number of `none` or `l2` at alpha0 = 1.
     assert {(part, key) for part, keys in whole.items() for key in keys} - {
         (part, key) for part, keys in switches.values() for key in keys
-    } == {("log", "episode_return"), ("shaping", "decay_potential"), ("shaping", "alpha0")}
+    } == {("log", "episode_return"), ("shaping", "decay_potential"), ("shaping", "start_weight")}
 
 
 def test_released_protocols_differ_by_the_last_commits_two_changes():
@@ -135,7 +135,7 @@ def test_released_protocols_differ_by_the_last_commits_two_changes():
 
 
 def test_a_label_may_be_given_to_the_baseline():
-    """The released run called `none` 0.5: alpha0 is a label there, and needs no meaning."""
+    """The released run called `none` 0.5: its weight starts at one, so alpha0 needs no meaning."""
     folders = [cell.folder for cell in load_study(DEFAULT).experiment_cells["released"]]
     assert "released_late/none/500000/alpha0.5" in folders
     assert len(folders) == 21

@@ -50,7 +50,7 @@ def weight_error(state, of, seed, network):
         small("none", environment={"clip_actions": True, "control_weight": 1.0}, entropy_coefficient=0.0),
         small("none", gae_lambda=0.5, discount=0.9, clip_range=0.01, max_gradient_norm=0.05, hidden_units=16),
         small("l2", environment={"control_weight": 1.0}, ratio_pairs="minibatch", gae_lambda=0.0),
-        small("decay", alpha0=0.5, shaping={"decay_potential": "l2sq", "alpha0": "label"}),
+        small("decay", alpha0=0.5, shaping={"decay_potential": "l2sq", "start_weight": "one"}),
         small("none", networks="separate", initial_log_std=-1.0, learning_rate_schedule="linear"),
         small("l2", networks="separate", initialisation="orthogonal", advantage_normalisation="minibatch"),
         small("none", initialisation="orthogonal", hidden_units=16),

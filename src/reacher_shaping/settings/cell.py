@@ -120,8 +120,8 @@ class Shaping(Settings):
     """The potential after an episode's last step, kept or zero."""
     decay_potential: Literal["variant", "l2sq"] = "variant"
     """Of a variant whose weight decays: the variant's own, or `l2sq` whatever it says."""
-    alpha0: Literal["weight", "label"] = "weight"
-    """The start weight is alpha0 (`weight`), or 1 whatever its label says (`label`)."""
+    start_weight: Literal["alpha0", "one"] = "alpha0"
+    """The weight at t = 0: alpha0, or one whatever alpha0 says."""
 
 
 class Log(Settings):
@@ -210,7 +210,7 @@ class Cell(Settings):
             raise ValueError(
                 f"budget = {self.budget} is below one rollout; allowed: >= {self.protocol.ppo.rollout_steps}"
             )
-        if self.variant.potential == "none" and self.alpha0 != 1 and self.protocol.shaping.alpha0 == "weight":
+        if self.variant.potential == "none" and self.alpha0 != 1 and self.protocol.shaping.start_weight == "alpha0":
             raise ValueError(f"alpha0 = {self.alpha0} has no meaning with variant '{self.variant.name}'; allowed: 1")
         return self
 

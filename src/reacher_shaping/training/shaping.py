@@ -62,12 +62,12 @@ class Rule:
     def of(cls, cell: Cell) -> "Rule":
         """Return a cell's rule.
 
-        `alpha0` "label" starts every weight at 1, as the code released with the paper does.
+        `start_weight` "one" starts every weight at 1, as the code released with the paper does.
         """
         settings = cell.protocol.shaping
         potential = getattr(import_module("reacher_shaping.training.potentials"), cell.potential)
         schedule = getattr(import_module("reacher_shaping.training.schedules"), cell.variant.schedule)
-        alpha0 = 1.0 if settings.alpha0 == "label" else cell.alpha0
+        alpha0 = 1.0 if settings.start_weight == "one" else cell.alpha0
         return cls(potential, schedule, cell.variant, alpha0, cell.protocol.ppo.discount, settings)
 
     def alpha(self, state: State, env_steps: ArrayLike) -> Array:
