@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from reacher_shaping.settings.cell import PPO, Cell, Protocol, Shaping, Variant
+from reacher_shaping.training.advantage import gae, next_values
 from reacher_shaping.training.shaping import Rule
 
 STEPS = 50
@@ -134,3 +135,52 @@ def test_linear_schedule_starts_at_alpha0_halves_halfway_and_ends_at_zero_for_go
 @given(ALPHAS)
 def test_constant_schedule_is_alpha0_for_ever(alpha0):
     assert alpha(VARIANTS["l2"], alpha0, [0, 1, 10**9]).tolist() == [alpha0] * 3
+
+
+def advantages_two_ways(*, gae_lambda, episode_end, terminal_potential, alpha0=50.0, discount=0.97):
+    """GAE of the shaped reward with V, and of the plain reward with V + alpha Phi: [S, L, T] each."""
+    rng = np.random.default_rng(0)
+    distance, values = rng.uniform(0, 0.4, (2, 3, 11)), rng.normal(0, 20, (2, 3, 11))
+    reward = rng.normal(size=(2, 3, 10))
+    ends = np.array([[False] * 9 + [True]] * 2 + [[False] * 6 + [True] + [False] * 3])
+    shaping = rule(
+        VARIANTS["l2"], alpha0=alpha0, discount=discount, episode_end=episode_end, terminal_potential=terminal_potential
+    )
+    shaped = reward + shaping.reward(distance, np.arange(30).reshape(3, 10), ends, {})
+    settings = {"ends": ends, "discount": discount, "gae_lambda": gae_lambda}
+    offset = values - alpha0 * distance
+    ways = (
+        gae(rewards, worth[..., :-1], next_values(worth, ends, episode_end), **settings)
+        for rewards, worth in ((shaped, values), (reward, offset))
+    )
+    taken = np.array([[True] * 10] * 2 + [[True] * 7 + [False] * 3])
+    return [advantage[:, taken] for advantage in ways]
+
+
+@pytest.mark.parametrize("gae_lambda", [0.0, 0.95, 1.0])
+@pytest.mark.parametrize(("episode_end", "terminal_potential"), [("bootstrap", "keep"), ("terminal", "zero")])
+def test_shaping_is_an_offset_of_the_critic(gae_lambda, episode_end, terminal_potential):
+    """GAE(r + alpha (gamma Phi' - Phi), V) = GAE(r, V + alpha Phi) (Wiewiora 2003, for an actor-critic).
+
+    So a potential acts until the critic has learned -alpha Phi.
+    """
+    shaped, offset = advantages_two_ways(
+        gae_lambda=gae_lambda, episode_end=episode_end, terminal_potential=terminal_potential
+    )
+    np.testing.assert_allclose(shaped, offset, rtol=0, atol=1e-12)
+
+
+def test_a_potential_kept_at_a_terminal_end_is_more_than_an_offset_of_the_critic():
+    """Its last value is a reward by itself: what the settings refuse with a sparse reward."""
+    shaped, offset = advantages_two_ways(gae_lambda=0.95, episode_end="terminal", terminal_potential="keep")
+    assert np.abs(shaped - offset).max() > 1
+
+
+def test_with_lambda_1_and_no_potential_at_the_end_shaping_is_a_baseline_of_the_state_alone():
+    """The advantage of a step moves by -alpha Phi(s), whatever was done after it."""
+    settings = {"gae_lambda": 1.0, "episode_end": "terminal", "terminal_potential": "zero"}
+    shaped, _ = advantages_two_ways(**settings)
+    plain, _ = advantages_two_ways(**settings, alpha0=1e-6)
+    taken = np.array([[True] * 10] * 2 + [[True] * 7 + [False] * 3])
+    distance = np.random.default_rng(0).uniform(0, 0.4, (2, 3, 11))[..., :-1][:, taken]
+    np.testing.assert_allclose(shaped - plain, 50 * distance, atol=1e-5)

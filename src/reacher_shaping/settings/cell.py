@@ -36,11 +36,11 @@ ADAPTIVE = ("success",)
 class Environment(Settings):
     """The task and its reward, the weight of the control cost, and whether actions are clipped to [-1, 1]."""
 
-    task: TaskName = Field("reacher", exclude_if=lambda task: task == "reacher")
+    task: TaskName = "reacher"
     """What is simulated, observed and rewarded; a file of `tasks/`."""
-    reward: Literal["dense", "sparse"] = Field("dense", exclude_if=lambda reward: reward == "dense")
+    reward: Literal["dense", "sparse"] = "dense"
     """Less the distance to the goal, or 1 within `success_radius` of it; both less the control cost."""
-    success_radius: Positive | None = Field(None, exclude_if=lambda radius: radius is None)
+    success_radius: Positive | None = None
     """Distance to the goal in m that counts as success; without it the evaluation's `radius`."""
     control_weight: NonNegative = 0.1
     """Reward taken per squared unit of action."""
@@ -167,7 +167,7 @@ class Variant(Settings):
     """The weight stays, or goes down in a line to 0 at `horizon`."""
     horizon: Count | None = None
     """Environment steps until a decay is at 0, or at 1 / e where it is exponential."""
-    rate: Annotated[float, Field(gt=0, le=1)] | None = Field(None, exclude_if=lambda rate: rate is None)
+    rate: Annotated[float, Field(gt=0, le=1)] | None = None
     """How far an adaptive weight moves in an iteration."""
 
     @model_validator(mode="after")

@@ -102,7 +102,7 @@ class Experiment(Settings):
     """What the study asks, as the report introduces it."""
     seeds: Annotated[int, Field(ge=1, le=10**5), WHOLE]
     """Runs of each cell."""
-    root_seed: Seed | None = Field(None, exclude_if=lambda root: root is None)
+    root_seed: Seed | None = None
     """Root of the study's own random streams, so that its runs share none with others; without it the main study's."""
     grid: Annotated[tuple[Row, ...], BeforeValidator(to_tuple)] = ()
     """Rows of cells."""
