@@ -8,10 +8,9 @@ QUICK := --directory build/quick --configfile workflow/quick.yaml
 FROM_TABLES := plot_figures plot_further plot_experiment format_tables run_notebook
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
-export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare archive verify reference test test-fast check lock bench peers clean
+.PHONY: help setup reproduce quick report compare check-bits archive verify reference test test-fast check lock bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -53,6 +52,9 @@ endif
 
 compare: $(READY) ## the run in results/ against the reference run, cell by cell
 	@python workflow/compare_reference.py
+
+check-bits: $(READY) ## retrains the reference run's smallest block, about a minute: the same bits here?
+	@python workflow/check_bits.py
 
 archive: $(READY) ## report, tables, figures, runs and manifests in one zip, ready for Zenodo
 	@python workflow/archive.py

@@ -3,28 +3,29 @@
 import time
 from collections.abc import Callable
 
-import torch
+import numpy as np
 from side_by_side import Workload
 
 from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.tasks.reacher import TASK
+from reacher_shaping.training.network import Array
 from reacher_shaping.training.rollout import Collector, Plan
 from reacher_shaping.training.train import TrainState
 
 
-def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[torch.Tensor, torch.Tensor]]]]:
+def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[Array, Array]]]]:
     """Return (times an iteration, operands) of all matrix products of one iteration."""
     plan = Plan(settings.rollout_steps, TASK.episode_steps)
     hidden, batch, features, outputs = (
         settings.hidden_units, settings.minibatch_size, TASK.observation_size + 1, TASK.action_size + 1,
     )  # fmt: skip
-    generator = torch.Generator().manual_seed(0)
+    generator = np.random.default_rng(0)
 
     def product(rows, inner, columns, *, left=False, right=False):
         """Operands of [rows, inner] @ [inner, columns]; `left`, `right`: that operand lies transposed in memory."""
-        a = torch.randn(seeds, *((inner, rows) if left else (rows, inner)), generator=generator)
-        b = torch.randn(seeds, *((columns, inner) if right else (inner, columns)), generator=generator)
-        return a.transpose(1, 2) if left else a, b.transpose(1, 2) if right else b
+        a = generator.standard_normal((seeds, *((inner, rows) if left else (rows, inner))), np.float32)
+        b = generator.standard_normal((seeds, *((columns, inner) if right else (inner, columns))), np.float32)
+        return a.swapaxes(1, 2) if left else a, b.swapaxes(1, 2) if right else b
 
     def forward(count):
         return [
@@ -35,8 +36,10 @@ def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[tor
 
     backward = [
         product(outputs, batch, hidden),
+        product(outputs, batch, 1),
         product(batch, outputs, hidden, left=True),
         product(hidden, batch, hidden, left=True),
+        product(1, batch, hidden),
         product(batch, hidden, hidden, right=True),
         product(features, batch, hidden, left=True),
     ]
@@ -58,7 +61,7 @@ class Floor:
         self.plan = Plan(cell.protocol.ppo.rollout_steps, TASK.episode_steps)
         self.collector = Collector(TASK, self.seeds, cell.root_seed, self.plan)
         self.products = [
-            (times, [(a, b, torch.empty(seeds, a.shape[1], b.shape[2])) for a, b in operands])
+            (times, [(a, b, np.empty((seeds, a.shape[1], b.shape[2]), np.float32)) for a, b in operands])
             for times, operands in matrix_products(cell.protocol.ppo, seeds)
         ]
 
@@ -80,14 +83,13 @@ class Floor:
         # The last lane of every seed is shorter than the time measured.
         return seconds * self.plan.steps / (self.plan.lanes * self.plan.episode_steps)
 
-    @torch.inference_mode()
     def products_seconds(self) -> float:
         """CPU seconds of an iteration's matrix products."""
         begun = time.process_time()
         for times, operands in self.products:
             for _ in range(times):
                 for a, b, out in operands:
-                    torch.bmm(a, b, out=out)
+                    np.matmul(a, b, out=out)
         return time.process_time() - begun
 
     def alone(self, share: Callable[[], float]) -> Workload:

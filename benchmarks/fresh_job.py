@@ -12,7 +12,7 @@ from pathlib import Path
 
 from reacher_shaping.jobs import training_job
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.storage import schemas
+from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import write_table
 from reacher_shaping.storage.policy_format import write_policy
 from reacher_shaping.storage.provenance import Record
@@ -37,7 +37,7 @@ with tempfile.TemporaryDirectory() as folder:
     block = Path(folder)
     with training_job.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
         write_policy(block / "policy.pt", list(seeds), state.policy().weights(), {})
-        write_table(block / "progress.parquet", state.progress_frame(), schemas.PROGRESS)
+        write_table(block / "progress.parquet", state.progress_frame(), block_schemas.PROGRESS)
 # Not getrusage: its peak starts from that of the process that started this one.
 peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
 print(json.dumps([*collected[0], int(peak.split()[1]) / 1024]))

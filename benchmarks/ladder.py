@@ -5,15 +5,17 @@ from contextlib import ExitStack
 from dataclasses import replace
 from unittest.mock import patch
 
+import numpy as np
 import plain_loop
 import torch
 from peers import as_installed
+from torch.distributions import Normal
 
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training import ppo
 from reacher_shaping.training import train as training
-from reacher_shaping.training.policy import forward, layers
+from reacher_shaping.training.network import layers
 
 RADIUS = 0.02
 WHOLE = replace(TASK, simulated_model=TASK.model)
@@ -32,10 +34,10 @@ class AutogradLearner(ppo.Learner):
     def update(self, records, shuffles, learning_rate):
         self.optimizer.param_groups[0]["lr"] = learning_rate
         for epoch in range(shuffles.shape[1]):
-            for chosen in shuffles[:, epoch].split(self.settings.minibatch_size, dim=1):
+            for chosen in np.split(shuffles[:, epoch], shuffles.shape[2] // self.settings.minibatch_size, axis=1):
                 self.optimizer.zero_grad()
-                minibatch = records.gather(1, chosen[..., None].expand(-1, -1, records.shape[2]))
-                self.loss(ppo.unpack(minibatch, self.shape.actions)).backward()
+                minibatch = ppo.unpack(np.take_along_axis(records, chosen[..., None], 1), self.shape.actions)
+                self.loss(ppo.Samples(*map(torch.from_numpy, minibatch))).backward()
                 norm = self.parameter.grad.norm(dim=1, keepdim=True)
                 self.parameter.grad.mul_((self.settings.max_gradient_norm / (norm + 1e-6)).clamp(max=1))
                 self.optimizer.step()
@@ -43,14 +45,17 @@ class AutogradLearner(ppo.Learner):
     def loss(self, samples):
         """The sum of the seeds' losses: their gradients do not meet."""
         settings, network = self.settings, layers(self.parameter, self.shape)
-        output = forward(network, samples.features)
+        hidden = torch.tanh(samples.features @ network.first)
+        hidden = torch.tanh(hidden @ network.second + network.second_bias)
+        output = network.head @ hidden.mT + network.head_bias
         mean, value = output[:, :-1], output[:, -1]
         deviation = (samples.action - mean) * torch.exp(-network.log_std)
-        ratio = torch.exp(ppo.log_probability(deviation, network.log_std) - samples.log_prob)
+        log_prob = Normal(0, 1).log_prob(deviation).sum(1) - network.log_std.sum(1)
+        ratio = torch.exp(log_prob - samples.log_prob)
         clipped = ratio.clamp(1 - settings.clip_range, 1 + settings.clip_range)
         surrogate = torch.min(ratio * samples.advantage, clipped * samples.advantage).mean(1)
         value_loss = (value - samples.target).square().mean(1)
-        entropy = settings.entropy_coefficient * ppo.entropy(network.log_std)
+        entropy = settings.entropy_coefficient * network.log_std.sum((1, 2))  # but for a constant
         return (settings.value_coefficient * value_loss - surrogate - entropy).sum()
 
 

@@ -8,6 +8,11 @@ distribution.
 The engine trains ten seeds in the time of a fraction of one plain run.
 """
 
+# ruff: noqa: E402 (the environment of a job must be set before the imports)
+from reacher_shaping import processor
+
+processor.fix()
+
 import argparse
 import json
 import sys
@@ -15,7 +20,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import torch
 from scipy import stats
 
 from reacher_shaping.evaluation.evaluate import evaluate
@@ -26,7 +30,7 @@ from reacher_shaping.training.train import train
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "oracles"))
-import plain_loop  # noqa: E402
+import plain_loop
 
 ENGINE_SEEDS = 10
 
@@ -66,7 +70,6 @@ def main():
     parser.add_argument("--seeds", type=int, default=3, help="of the plain loop")
     parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "learning.json")
     given = parser.parse_args()
-    torch.set_num_threads(1)
     study = load_study(ROOT / "config.yaml")
     cell = next(cell for cell in study.cells if (cell.variant.name, cell.budget) == (given.variant, given.budget))
 

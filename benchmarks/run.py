@@ -5,13 +5,14 @@
 Writes results.csv, results.md and results.svg into FOLDER (default: this folder; with --quick: build/benchmarks).
 """
 
-# ruff: noqa: E402 (one thread and the path of the plain loop must be set before the imports)
-import os
+# ruff: noqa: E402 (the environment of a job and the path of the plain loop must be set before the imports)
+from reacher_shaping import processor
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported
+processor.fix()
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -27,7 +28,6 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "tests" / "oracles"))  # the plain loop lives there
 
 import peers
-import torch
 from floor import Floor, fraction
 from ladder import RADIUS, engine, rungs
 from present import write
@@ -39,7 +39,8 @@ from reacher_shaping.jobs.checkpoint import save_checkpoint
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.study import load_study
 from reacher_shaping.tasks.reacher import TASK
-from reacher_shaping.training.policy import Policy, Shape, initialise
+from reacher_shaping.training.network import Shape
+from reacher_shaping.training.policy import Policy, initialise
 from reacher_shaping.training.train import TrainState
 
 TRAINED_LOG_STD = -2.2
@@ -318,7 +319,6 @@ def main() -> None:
         size = Size(**{**vars(size), "repeats": max(1, options.repeats)})
     out = options.out or (HERE.parent / "build" / "benchmarks" if options.quick else HERE)
     core = pin()
-    torch.set_num_threads(1)
     load, begun, measures = os.getloadavg()[0], time.time(), []
     for part in options.part or PARTS:
         for found in PARTS[part](size):

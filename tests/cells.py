@@ -2,7 +2,8 @@
 
 from reacher_shaping.settings.cell import PPO, Cell, Environment, Log, Protocol, Shaping, Variant
 from reacher_shaping.tasks.reacher import TASK
-from reacher_shaping.training.policy import Policy, Shape, initialise
+from reacher_shaping.training.network import Shape
+from reacher_shaping.training.policy import Policy, initialise
 
 VARIANTS = {
     "none": Variant(name="none", potential="none"),

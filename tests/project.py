@@ -39,7 +39,7 @@ class Project:
 
     def start(self, *arguments: str) -> subprocess.Popen:
         """Start Python on the copy, in a process group of its own."""
-        environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}
+        environment = os.environ | {"PYTHONPATH": str(self.folder / "src")}
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         command = [sys.executable, *arguments]
         # What a shell runs in the background ignores Ctrl-C, and so would all it starts.

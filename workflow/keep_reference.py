@@ -19,7 +19,7 @@ from reacher_shaping.settings.outputs import table_files
 from reacher_shaping.settings.study import block_name, load_study, read_settings, settings_hash
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import ArtifactError, read_json, read_table, write_json, write_text
-from reacher_shaping.storage.reference import keep_experiments, keep_tables, manifest
+from reacher_shaping.storage.reference import keep_experiments, keep_tables, manifest, published_bits
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
@@ -35,6 +35,7 @@ def main() -> None:
     settings = read_settings("config.yaml", *sys.argv[1:2])
     study = load_study(settings)
     blocks = manifests(study.cells, study.blocks())
+    bits = published_bits(blocks)
     keep_tables(RESULTS, KEPT)
     files = {
         name: table_files(switches=own.switches is not None, peers=own.peers is not None)
@@ -48,6 +49,7 @@ def main() -> None:
     peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
     record = manifest(resolved, settings_hash(study), blocks, further, peers)
     write_json(KEPT / "manifest.json", record)
+    write_json(KEPT / "bits.json", bits)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 
     cells = read_table(KEPT / "cells.parquet", schemas.CELLS)

@@ -2,13 +2,12 @@
 
 import argparse
 import math
-import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reacher_shaping import __version__
+from reacher_shaping import __version__, processor
 
 if TYPE_CHECKING:
     from reacher_shaping.settings.cell import Environment
@@ -27,7 +26,7 @@ _EPILOG = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status: 0, or 1 with one line on stderr; argparse exits with 2."""
     options = parser().parse_args(arguments)
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    processor.fix()
     from reacher_shaping.evaluation.viewer import NoDisplayError
     from reacher_shaping.storage.files import ArtifactError  # after the arguments: --help needs no numerics
 
@@ -134,13 +133,11 @@ def _play(options: argparse.Namespace) -> None:
 def _evaluate(options: argparse.Namespace) -> None:
     import numpy as np
     import pandas as pd
-    import torch
 
     from reacher_shaping.evaluation.evaluate import evaluate
     from reacher_shaping.evaluation.policies import load_policies
     from reacher_shaping.storage.files import require_replaceable, write_text
 
-    torch.set_num_threads(1)
     if options.out is not None:
         require_replaceable(options.out)
     files = [(path, load_policies(path)) for path in options.paths]  # all of them first: a wrong one costs no wait

@@ -91,10 +91,12 @@ def uniform(generator, hidden):
 
 def orthogonal(generator, hidden):
     """Orthogonal weights of three layers as Stable-Baselines3 scales them, biases 0."""
-    random = torch.Generator().manual_seed(int(generator.integers(2**63)))
 
     def draw(outputs, inputs, gain):
-        return nn.init.orthogonal_(torch.empty(outputs, inputs), gain, random)
+        longer, shorter = max(outputs, inputs), min(outputs, inputs)
+        q, r = torch.linalg.qr(torch.from_numpy(generator.standard_normal((longer, shorter))))
+        q = gain * (q * r.diagonal().sign()).float()
+        return q if outputs == longer else q.T
 
     first, second = draw(hidden, 10, 2**0.5), draw(hidden, hidden, 2**0.5)
     heads = torch.cat([draw(2, hidden, 0.01), draw(1, hidden, 1.0)])

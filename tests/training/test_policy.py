@@ -12,7 +12,8 @@ from plain_loop import Network
 
 from reacher_shaping.settings.cell import PPO
 from reacher_shaping.tasks.reacher import TASK
-from reacher_shaping.training.policy import ALIGNMENT, Policy, forward, inputs, parameter_count
+from reacher_shaping.training.network import ALIGNMENT, parameter_count
+from reacher_shaping.training.policy import Policy, inputs
 
 SEEDS = [0, 1, 5]
 
@@ -37,7 +38,7 @@ def test_actions_and_values_are_those_of_torch_linear_layers_with_the_same_weigh
     observation = rng.normal(size=(3, 41, 10))
     noise = rng.standard_normal((3, 41, 2), dtype=np.float32)
     mean, sampled = policy.act(observation, None), policy.act(observation, noise)
-    value = forward(policy.layers, inputs(observation))[:, 2]
+    value = policy.passes().forward(inputs(observation))[:, 2]
     for seed, network in enumerate(networks(policy)):
         distribution, expected_value = network(torch.from_numpy(observation[seed]).float())
         expected = distribution.mean.detach().numpy()
@@ -102,7 +103,7 @@ def test_a_network_of_two_trunks_is_that_of_torch():
     settings = PPO(hidden_units=16, networks="separate", initial_log_std=-0.5)
     policy = fresh_policy(SEEDS, 3, settings)
     observation = np.random.default_rng(3).normal(size=(3, 9, 10))
-    outputs = forward(policy.layers, inputs(observation))
+    outputs = torch.from_numpy(policy.passes().forward(inputs(observation)))
     for seed in range(3):
         network = Network(16, separate=True)
         network.load_state_dict({name: tensor[seed] for name, tensor in policy.weights().items()})

@@ -1,70 +1,80 @@
-"""Which bits hold where: training jobs in fresh processes under other threads, vector units and modes of MKL."""
+"""A job has the same bits on every processor: under other environments, and on processors that qemu emulates."""
 
+import io
 import os
+import shutil
 import subprocess
 import sys
-from functools import cache
+import sysconfig
 from pathlib import Path
 
-import numpy as np
 import pytest
+import torch
+
+from reacher_shaping import processor
 
 pytestmark = pytest.mark.slow
 
+TESTS = Path(__file__).parents[1]
 JOB = """
 import sys
 from pathlib import Path
-import torch
+from reacher_shaping import processor
+processor.fix(sys.argv[2])
 from cells import small
+from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.jobs import training_job
+from reacher_shaping.storage.policy_format import write_policy
 path = Path(sys.argv[1])
-cell = small("l2", iterations=3)
-with training_job.trained_block(cell, [0, 1], radius=0.02, folder=path / "checkpoint", report=print) as (state, _):
-    assert torch.get_num_threads() == 1, "a job is one thread"
-    state.rows.numpy().tofile(path / "weights")
+for variant, changes in (("l2", {}), ("decay", {"networks": "separate", "initialisation": "orthogonal"})):
+    cell = small(variant, iterations=2, **changes)
+    with training_job.trained_block(cell, [0, 1], radius=0.02, folder=path / "checkpoint", report=print) as (state, _):
+        policy = state.policy()
+        write_policy(path / f"{variant}.pt", state.seeds, policy.weights(), {})
+        state.progress_frame().to_parquet(path / f"{variant}-progress.parquet")
+        options = {"episodes": 10, "radius": 0.02, "environment": cell.protocol.environment, "root_seed": 1}
+        episodes = evaluate(policy.act, state.seeds, mode="stochastic", **options)
+        episodes.to_parquet(path / f"{variant}-episodes.parquet")
 """
-FLAGS = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
-needs_avx2 = pytest.mark.skipif(" avx2 " not in FLAGS, reason="sets modes of x86 processors with AVX2")
+EMULATED = ("Haswell-v4", "Skylake-Client", "EPYC-v3")
+needs_avx2 = pytest.mark.skipif(not processor.has_avx2(), reason="this processor has no AVX2: its bits are its own")
+needs_qemu = pytest.mark.skipif(not shutil.which("qemu-x86_64"), reason="no qemu-x86_64 (Debian: qemu-user)")
+
+
+def job(folder: Path, *, kernels: str = "portable", cpu: str = "", **variables: str) -> dict[str, bytes]:
+    """The files of a job, on an emulated processor if `cpu` names one."""
+    folder.mkdir()
+    paths = [str(TESTS), str(TESTS.parent / "src"), sysconfig.get_path("purelib"), *filter(None, sys.path)]
+    emulator = ["qemu-x86_64", "-cpu", cpu] if cpu else []
+    command = [*emulator, os.path.realpath(sys.executable), "-W", "ignore", "-c", JOB, str(folder), kernels]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | variables
+    subprocess.run(command, env=environment, check=True, timeout=1800)
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """A function that trains under environment variables and gives the weights."""
-    folder = tmp_path_factory.mktemp("trained")
-
-    @cache
-    def weights(*variables: str) -> np.ndarray:
-        path = folder / "-".join(["job", *variables])
-        path.mkdir()
-        environment = os.environ | {"OMP_NUM_THREADS": "1"} | dict(pair.split("=") for pair in variables)
-        subprocess.run(
-            [sys.executable, "-c", JOB, str(path)], env=environment, cwd=Path(__file__).parents[1], check=True
-        )
-        return np.fromfile(path / "weights", dtype=np.float32)
-
-    return weights
+def made(tmp_path_factory):
+    """The files of a job with nothing special about it."""
+    return job(tmp_path_factory.mktemp("made") / "job")
 
 
-def test_a_job_gives_the_same_bits_whatever_number_of_threads_its_environment_names(trained):
-    """Because it runs on one: PyTorch's sums over two threads have other last bits on some processors."""
-    assert trained().size > 10_000
-    assert np.array_equal(trained(), trained("OMP_NUM_THREADS=2"))
+def test_a_job_takes_no_thread_and_no_kernel_from_its_environment(made, tmp_path):
+    assert len(made) == 6
+    others = {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2", "OPENBLAS_CORETYPE": "Sandybridge"}
+    assert job(tmp_path / "job", **others, ATEN_CPU_CAPABILITY="default", NPY_DISABLE_CPU_FEATURES="X86_V3") == made
+
+
+def test_native_kernels_change_rounding_only(made, tmp_path):
+    """Training amplifies rounding: 1e-7 here, after two short iterations, is another sample after a whole run."""
+    native = job(tmp_path / "job", kernels="native")
+    for name in ("l2.pt", "decay.pt"):
+        ours, theirs = (torch.load(io.BytesIO(files[name]), weights_only=True)["weights"] for files in (made, native))
+        for key, tensor in ours.items():
+            torch.testing.assert_close(tensor, theirs[key], rtol=0, atol=1e-5)
 
 
 @needs_avx2
-def test_pytorchs_own_kernels_give_the_same_bits_with_avx2_and_avx512(trained):
-    assert np.array_equal(trained(), trained("ATEN_CPU_CAPABILITY=avx2"))
-
-
-@needs_avx2
-def test_one_mode_of_the_matrix_library_gives_the_same_bits_on_newer_processors(trained):
-    """MKL's conditional numerical reproducibility: with it, a processor with AVX-512 computes as one with AVX2."""
-    older = trained("MKL_ENABLE_INSTRUCTIONS=AVX2", "MKL_CBWR=AVX2")
-    assert np.array_equal(trained("MKL_CBWR=AVX2"), older)
-
-
-@needs_avx2
-@pytest.mark.parametrize("variables", [("MKL_CBWR=COMPATIBLE",), ("ATEN_CPU_CAPABILITY=default",)])
-def test_other_vector_units_change_rounding_only(trained, variables):
-    """Training amplifies rounding: 1e-7 here, after three short iterations, is another sample after a whole run."""
-    np.testing.assert_allclose(trained(*variables), trained(), rtol=0, atol=1e-5)
+@needs_qemu
+@pytest.mark.parametrize("cpu", EMULATED)
+def test_a_job_has_the_same_bytes_on_another_processor(made, tmp_path, cpu):
+    assert job(tmp_path / "job", cpu=cpu) == made

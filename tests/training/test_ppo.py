@@ -17,7 +17,8 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from reacher_shaping.settings.cell import PPO
 from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training import ppo
-from reacher_shaping.training.policy import Policy, Shape, initialise, parameter_count
+from reacher_shaping.training.network import Shape, parameter_count
+from reacher_shaping.training.policy import Policy, initialise
 
 HIDDEN = 8
 
@@ -49,13 +50,14 @@ def random_problem(key, *, seeds=3, count=64, hidden=HIDDEN, dtype=torch.float64
             distribution, _ = network_of(rows, seed, hidden)(features[seed, :, :10])
             log_prob[seed] = distribution.log_prob(action[seed]).sum(-1)
     log_prob += spread * normal(seeds, count)
-    records = ppo.pack(features, action, log_prob, normal(seeds, count), 3 * normal(seeds, count))
-    return rows.to(dtype), records.to(dtype)
+    fields = (features, action, log_prob, normal(seeds, count), 3 * normal(seeds, count))
+    return rows.to(dtype), ppo.pack(*(field.to(dtype).numpy() for field in fields))
 
 
 def minibatch(samples, seed):
     """The arguments of the plain loss: observation, action, log_prob, advantage, target."""
-    return samples.features[seed, :, :10], samples.action[seed].T, *(field[seed] for field in samples[2:])
+    fields = samples.features[seed, :, :10], samples.action[seed].T, *(field[seed] for field in samples[2:])
+    return tuple(torch.from_numpy(np.ascontiguousarray(field)) for field in fields)
 
 
 @settings(deadline=None, max_examples=40)
@@ -171,12 +173,12 @@ def test_log_probability_and_entropy_are_stable_baselines3s():
     mean, action = torch.randn(2, 3, 50, 2, generator=generator, dtype=torch.float64)
     log_std = torch.randn(3, 2, generator=generator, dtype=torch.float64)
     deviation = ((action - mean) / log_std.exp()[:, None]).transpose(1, 2)
-    ours = ppo.log_probability(deviation, log_std[..., None])
+    ours = torch.from_numpy(ppo.log_probability(deviation.numpy(), log_std[..., None].numpy()))
     for seed in range(3):
         distribution = DiagGaussianDistribution(2).proba_distribution(mean[seed], log_std[seed])
         torch.testing.assert_close(ours[seed], distribution.log_prob(action[seed]), rtol=1e-12, atol=1e-12)
         expected = distribution.entropy()[0]
-        torch.testing.assert_close(ppo.entropy(log_std[..., None])[seed], expected, rtol=1e-12, atol=1e-12)
+        assert ppo.entropy(log_std[..., None].numpy())[seed] == pytest.approx(expected.item(), rel=1e-12)
 
 
 def test_adam_is_torchs():
@@ -216,10 +218,7 @@ def test_gradients_are_clipped_per_seed_as_torch_clips_one_network(scale):
 def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_order():
     options = PPO(hidden_units=HIDDEN, rollout_steps=96, minibatch_size=32, learning_rate=0.01)
     rows, records = random_problem(3, count=96)
-    shuffles = torch.stack(
-        [torch.stack([torch.randperm(96, generator=torch.Generator().manual_seed(10 * s + e)) for e in range(3)])
-         for s in range(3)]
-    )  # fmt: skip
+    shuffles = np.stack([[np.random.default_rng(10 * s + e).permutation(96) for e in range(3)] for s in range(3)])
     networks = [network_of(rows, seed, HIDDEN) for seed in range(3)]
     learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
@@ -229,7 +228,7 @@ def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_ord
         optimizer = torch.optim.Adam(network.parameters(), lr=0.01, eps=options.adam_epsilon)
         fields = minibatch(ppo.unpack(records, 2), seed)
         for epoch in range(3):
-            for chosen in shuffles[seed, epoch].split(32):
+            for chosen in torch.from_numpy(shuffles[seed, epoch]).split(32):
                 optimizer.zero_grad()
                 loss(network, options, *(field[chosen] for field in fields)).backward()
                 torch.nn.utils.clip_grad_norm_(network.parameters(), options.max_gradient_norm)
@@ -242,10 +241,10 @@ def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_ord
 def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
     options = PPO()
     rows, records = random_problem(4, hidden=64, count=128, dtype=torch.float32)
-    shuffles = torch.stack([torch.randperm(128).expand(2, 128) for _ in range(3)])
+    shuffles = np.random.default_rng(4).permuted(np.tile(np.arange(128), (3, 2, 1)), axis=2)
     clean = ppo.Learner(rows.clone(), options, Shape.of(TASK, options))
     clean.update(records, shuffles, options.learning_rate)
-    rows, records = rows.clone(), records.clone()
+    rows, records = rows.clone(), records.copy()
     (rows if poison == "weights" else records)[1] = math.nan
     learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
@@ -257,8 +256,8 @@ def test_padding_of_the_rows_stays_zero():
     options = PPO()
     rows, records = random_problem(5, hidden=64, dtype=torch.float32)
     learner = ppo.Learner(rows, options, Shape.of(TASK, options))
-    learner.update(records, torch.arange(64).expand(3, 5, 64), options.learning_rate)
-    used = sum(math.prod(layer.shape[1:]) for layer in learner.network)
+    learner.update(records, np.tile(np.arange(64), (3, 5, 1)), options.learning_rate)
+    used = sum(math.prod(layer.shape[1:]) for layer in learner.passes.layers)
     assert used < rows.shape[1]
     assert not rows[:, used:].any()
 
@@ -267,7 +266,7 @@ def test_diagnostics_are_those_stable_baselines3_logs():
     options = PPO()
     rows, records = random_problem(6, hidden=64, seeds=2, dtype=torch.float32)
     samples = ppo.unpack(records, 2)
-    found = ppo.diagnose(Policy(rows, Shape.of(TASK, options)).layers, records, options.clip_range)
+    found = ppo.diagnose(Policy(rows, Shape.of(TASK, options)).passes(), records, options.clip_range)
     for seed in range(2):
         model = stable_ppo(samples, seed, network_of(rows, seed, 64), options)
         model.train()
@@ -284,15 +283,16 @@ def test_diagnostics_are_those_stable_baselines3_logs():
 
 
 def test_records_keep_every_field():
-    fields = (torch.randn(2, 5, 11), torch.randn(2, 5, 2), *(torch.randn(2, 5) for _ in range(3)))
+    rng = np.random.default_rng(0)
+    fields = [rng.standard_normal(shape, np.float32) for shape in ((2, 5, 11), (2, 5, 2), (2, 5), (2, 5), (2, 5))]
     samples = ppo.unpack(ppo.pack(*fields), 2)
-    assert torch.equal(samples.action, fields[1].transpose(1, 2))
+    np.testing.assert_array_equal(samples.action, fields[1].swapaxes(1, 2))
     for ours, given_ in zip((samples.features, *samples[2:]), (fields[0], *fields[2:]), strict=True):
         np.testing.assert_array_equal(ours, given_)
 
 
 def test_minibatches_are_normalised_as_stable_baselines3_does():
-    advantage = torch.tensor([[1.0, 2.0, 3.0], [5.0, -1.0, 8.0]])
+    advantage = np.array([[1.0, 2.0, 3.0], [5.0, -1.0, 8.0]])
     # stable_baselines3/ppo/ppo.py: (advantages - advantages.mean()) / (advantages.std() + 1e-8), with torch's std
-    expected = torch.tensor([[-1.0, 0.0, 1.0], [1 / math.sqrt(21), -5 / math.sqrt(21), 4 / math.sqrt(21)]])
-    torch.testing.assert_close(ppo._normalise(advantage), expected)
+    expected = [[-1.0, 0.0, 1.0], [1 / math.sqrt(21), -5 / math.sqrt(21), 4 / math.sqrt(21)]]
+    np.testing.assert_allclose(ppo.normalise(advantage), expected, rtol=1e-7)

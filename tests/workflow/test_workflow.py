@@ -7,6 +7,7 @@ import pytest
 from project import Project
 from rocrate.rocrate import ROCrate
 
+from reacher_shaping import processor
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_json, read_table, sha256
 
@@ -159,8 +160,10 @@ def test_manifest_holds_the_checksums_of_the_block(project):
     assert set(manifest["outputs"]) == made
     for name, checksum in manifest["outputs"].items():
         assert sha256(block / name) == checksum
-    for key in ("settings", "versions", "git", "machine", "threads", "wall_seconds", "cpu_seconds"):
+    for key in ("settings", "weights", "versions", "git", "machine", "threads", "wall_seconds", "cpu_seconds"):
         assert manifest[key] is not None
+    assert manifest["kernels"] == processor.kernels()
+    assert manifest["core_type"] == processor.core_type()
     assert manifest["env_steps"] == 2048
     assert manifest["env_steps_per_second"] > 0
 

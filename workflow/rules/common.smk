@@ -5,25 +5,27 @@ import re
 import sys
 from functools import cache
 
+from reacher_shaping import processor
 from reacher_shaping.settings.base import ConfigError, short
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.settings.yaml_file import merged
 from reacher_shaping.storage.code_hash import code_hash
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES, made_by, read_by
 
-os.environ.update(OMP_NUM_THREADS="1")  # one thread a job; Snakemake fills the cores with jobs
-
 
 def or_stop(read):
     """What `read` makes of the settings; where they are wrong, end with its one line and no traceback."""
     try:
         return read()
-    except ConfigError as error:
+    except ValueError as error:
         sys.exit(f"ConfigError: {error}")
 
 
 def read_study():
     """config.yaml with what `--configfile`, `--config` and a workflow that imports this one lay over it.
+
+    `kernels` is none of the study's settings but the machine's, so it comes by `--config` or from a profile alone: it
+    goes into the environment of the jobs, as their one thread does.
 
     There is no `configfile:`, since Snakemake reads YAML 1.1, in which 010 is 8; so the files are read here again.
     """
@@ -33,7 +35,9 @@ def read_study():
             wanted = "allowed: a single value; write this one into a file and name it with --configfile"
             raise ConfigError(f"--config {key} = {short(value)}: {wanted}")
     overlays = read_settings(*workflow.overwrite_configfiles)
-    return load_study(merged(read_settings(HERE / "config.yaml"), config, overlays, single))
+    settings = merged(read_settings(HERE / "config.yaml"), config, overlays, single)
+    processor.fix(settings.pop("kernels", "portable"))
+    return load_study(settings)
 
 
 def source(path):

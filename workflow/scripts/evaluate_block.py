@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pandas as pd
-import torch
 from job import logged
 
 from reacher_shaping.evaluation.evaluate import evaluate
@@ -23,7 +22,6 @@ evaluation = Evaluation.model_validate_json(params.evaluation)
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(snakemake.threads)
     trained = read_policy(unchanged(snakemake.input.policy))
     policy = Policy.from_weights(trained.weights, load_task(environment.task))
     frames = [

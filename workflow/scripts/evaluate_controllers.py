@@ -3,7 +3,6 @@
 import json
 
 import pandas as pd
-import torch
 from job import logged
 
 from reacher_shaping.evaluation.controllers import evaluate_controllers
@@ -17,7 +16,6 @@ evaluation = Evaluation.model_validate_json(params.evaluation)
 protocols = [Protocol.model_validate(settings) for settings in json.loads(params.protocols)]
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(snakemake.threads)
     rows = [
         evaluate_controllers(
             episodes=evaluation.episodes,

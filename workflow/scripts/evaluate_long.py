@@ -1,6 +1,5 @@
 """Evaluate the policies of one seed block on episodes longer than those they were trained on."""
 
-import torch
 from job import logged
 
 from reacher_shaping.evaluation.episode_lengths import evaluate_lengths
@@ -17,7 +16,6 @@ params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(snakemake.threads)
     trained = read_policy(unchanged(snakemake.input.policy))
     long = evaluate_lengths(
         Policy.from_weights(trained.weights, load_task(environment.task)).act,

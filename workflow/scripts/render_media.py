@@ -1,6 +1,5 @@
 """Film the first evaluation episode of a cell's first run, as GIF and MP4."""
 
-import torch
 from job import logged
 
 from reacher_shaping.evaluation import video
@@ -14,7 +13,6 @@ params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
-    torch.set_num_threads(snakemake.threads)
     trained = read_policy(unchanged(snakemake.input[0]))
     weights = {name: tensor[:1] for name, tensor in trained.weights.items()}
     first = Policy.from_weights(weights, load_task(environment.task))

@@ -4,7 +4,6 @@ import hashlib
 import json
 from pathlib import Path
 
-import torch
 from job import logged
 
 from reacher_shaping.jobs import search
@@ -33,7 +32,6 @@ def measure(values: search.Values) -> search.Values:
 
 
 with logged(snakemake.log[0]) as say:
-    torch.set_num_threads(1)
     done = read_table(kept, schemas.TRIALS).head(spec.trials) if kept.exists() else None
     meter = Meter(spec.trials, spec.seeds * spec.budget, 0 if done is None else len(done), unit="trial")
     for trials in search.trials(spec, measure, done):

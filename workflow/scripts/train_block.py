@@ -7,11 +7,12 @@ from pathlib import Path
 from job import logged
 
 from reacher_shaping.jobs import training_job
+from reacher_shaping.processor import kernels
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.code_hash import reached_files
 from reacher_shaping.storage.files import write_json, write_monitors, write_table
-from reacher_shaping.storage.policy_format import write_policy
+from reacher_shaping.storage.policy_format import weights_checksum, write_policy
 from reacher_shaping.storage.provenance import Record
 from reacher_shaping.tasks.base import load_task
 
@@ -20,7 +21,9 @@ params, output = snakemake.params, snakemake.output
 cell = Cell.model_validate_json(params.cell)
 task = load_task(cell.protocol.environment.task)
 block = Path(output.policy).parent
-key = hashlib.sha256(json.dumps([params.cell, params.seeds, params.radius, params.code]).encode()).hexdigest()[:16]
+key = hashlib.sha256(
+    json.dumps([params.cell, params.seeds, params.radius, params.code, kernels()]).encode()
+).hexdigest()[:16]
 settings = {"cell": cell.settings(), "radius": params.radius}
 
 with logged(snakemake.log[0]) as say:
@@ -36,4 +39,4 @@ with logged(snakemake.log[0]) as say:
         steps = state.iteration * state.plan.steps * len(params.seeds)
         training = record.to_dict(block, reached_files(__file__, cell.chosen_code), files, steps, snakemake.threads)
         who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
-        write_json(output.training, {**who, **training})
+        write_json(output.training, {**who, "weights": weights_checksum(weights), **training})

@@ -16,7 +16,8 @@ from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
 from reacher_shaping.settings.cell import PPO, Environment
 from reacher_shaping.stats import wilson_interval
 from reacher_shaping.tasks.base import load_task
-from reacher_shaping.training.policy import Policy, Shape, initialise
+from reacher_shaping.training.network import Shape
+from reacher_shaping.training.policy import Policy, initialise
 
 Array = NDArray[np.float64]
 Noise = NDArray[np.float32] | None

@@ -13,7 +13,7 @@ import torch
 
 from reacher_shaping.storage.files import ArtifactError, read_sealed, write_sealed
 from reacher_shaping.storage.policy_format import load_tensors
-from reacher_shaping.training.policy import Shape
+from reacher_shaping.training.network import Shape
 from reacher_shaping.training.ppo import Adam
 from reacher_shaping.training.rollout import Plan
 from reacher_shaping.training.train import TrainState

@@ -11,7 +11,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pandas as pd
-import torch
 from numpy.typing import NDArray
 
 from reacher_shaping.evaluation.evaluate import Actor, evaluate
@@ -34,7 +33,6 @@ def train(algorithm: str, seed: int, budget: int, protocol: Protocol, report: Re
     """
     import stable_baselines3  # here, since it is heavy and used by this optional target alone
 
-    torch.set_num_threads(1)
     environment = gymnasium.make(
         load_task(protocol.environment.task).gymnasium_id, reward_control_weight=protocol.environment.control_weight
     )

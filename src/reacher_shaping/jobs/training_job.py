@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import torch
-
 from reacher_shaping.jobs.checkpoint import load_checkpoint, save_checkpoint
 from reacher_shaping.jobs.progress import Meter
 from reacher_shaping.settings.cell import Cell
@@ -40,7 +38,6 @@ def trained_block(
     the time that went into the checkpoint before.
     """
     record = record or Record()
-    torch.set_num_threads(1)  # a job is one thread, on any machine: the number of threads may change the last bits
     checkpoint = folder / "checkpoint.pt"
     with exclusive(folder.with_suffix(".lock")):
         state, seconds = load_checkpoint(checkpoint) if checkpoint.exists() else (None, (0.0, 0.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
@@ -31,6 +32,14 @@ def write_policy(
     buffer = io.BytesIO()  # not the path: torch stores a file's name in it
     torch.save(content, buffer)
     write_bytes(path, buffer.getvalue())
+
+
+def weights_checksum(weights: Mapping[str, Tensor]) -> str:
+    """Return the sha256 of the weights' bytes, in the order of their names: equal for equal bits and nothing else."""
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        digest.update(weights[name].detach().contiguous().numpy().tobytes())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)

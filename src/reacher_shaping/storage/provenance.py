@@ -13,6 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from reacher_shaping import processor
 from reacher_shaping.storage.files import ArtifactError, read_json, sha256
 
 PACKAGE = "reacher_shaping"
@@ -108,6 +109,8 @@ class Record:
             "git": git_state(Path(__file__).parent),
             "machine": machine(),
             "threads": threads,
+            "kernels": processor.kernels(),
+            "core_type": processor.core_type(),
             "started": self.started.isoformat(timespec="seconds"),
             "finished": datetime.now(UTC).isoformat(timespec="seconds"),
             "wall_seconds": round(wall, 3),

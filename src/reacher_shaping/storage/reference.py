@@ -70,7 +70,7 @@ def manifest(
 
     The records are without their inputs.
     """
-    numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads")
+    numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads", "kernels", "core_type")
     kept = ("algorithm", "seeds", "git", "machine", "versions", "outputs", *numbers)
 
     def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -83,6 +83,20 @@ def manifest(
         "experiments": {name: records(given) for name, given in further.items()},
         "peers": records(peers),
     }
+
+
+def published_bits(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what it takes to train the smallest block again and to see whether its weights have the same bits.
+
+    Raises ValueError if a block was made with native kernels: only portable ones can be compared elsewhere.
+    """
+    for block in blocks:
+        if block.get("kernels") != "portable":
+            name = block["settings"]["cell"]["variant"]["name"]
+            raise ValueError(f"a block of {name} was made with native kernels; allowed in a reference run: portable")
+    smallest = min(blocks, key=lambda block: int(block["env_steps"]))
+    kept = ("settings", "seeds", "weights", "kernels", "core_type", "machine", "versions")
+    return {name: smallest[name] for name in kept}
 
 
 def _spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:

@@ -19,7 +19,8 @@ from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.storage.block_schemas import MEASURES
 from reacher_shaping.tasks.base import Task, load_task
 from reacher_shaping.training import advantage, ppo
-from reacher_shaping.training.policy import Policy, Shape, forward, initialise, inputs
+from reacher_shaping.training.network import Shape, silent
+from reacher_shaping.training.policy import Policy, initialise, inputs
 from reacher_shaping.training.rollout import Collector, Plan, Rollout
 from reacher_shaping.training.shaping import Rule, State
 
@@ -143,10 +144,10 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
         records, summary = prepare(cell, task, rule, state, rollout, radius)
         rate = learning_rate(settings, state.iteration / cell.iterations)
         learner.update(records, _shuffles(cell, seeds, state.iteration), rate)
-        losses = ppo.diagnose(learner.network, records, settings.clip_range)
+        losses = ppo.diagnose(policy.passes(), records, settings.clip_range)
         measured = {
             **summary,
-            "action_std": learner.network.log_std.exp().mean((1, 2)),
+            "action_std": np.exp(policy.layers.log_std.numpy()).mean((1, 2)),
             **losses._asdict(),
             "alpha": rule.alpha(state.schedule, state.iteration * state.plan.steps),
         }
@@ -193,7 +194,7 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
 
 def prepare(
     cell: Cell, task: Task, rule: Rule, state: TrainState, rollout: Rollout, radius: float
-) -> tuple[Tensor, Rows]:
+) -> tuple[NDArray[np.float32], Rows]:
     """Turn a rollout into sample records [S, N, F + A + 4] and the rollout's summary, [S] each.
 
     Samples stand in the order of the sequential rollout. The summary also holds `episode_returns`
@@ -219,10 +220,10 @@ def prepare(
     targets = advantages + fitted
     records = ppo.pack(
         plan.sequence(features),
-        plan.sequence(torch.from_numpy(rollout.action)),
+        plan.sequence(rollout.action),
         plan.sequence(log_prob),
-        torch.from_numpy(advantage.normalise(advantages)).float(),
-        torch.from_numpy(targets).float(),
+        advantage.normalise(advantages),
+        targets,
     )
     return records, {
         **_summary(reward, extra, rollout, plan, radius),
@@ -230,18 +231,18 @@ def prepare(
     }
 
 
-@torch.inference_mode()
-def _outputs(policy: Policy, rollout: Rollout) -> tuple[Tensor, Tensor, Array]:
+@silent
+def _outputs(policy: Policy, rollout: Rollout) -> tuple[NDArray[np.float32], NDArray[np.float32], Array]:
     """Return inputs [S, L, T, F + 1], log-probabilities [S, L, T] and values [S, L, T+1] of a whole rollout."""
     seeds, lanes, times, _ = rollout.observation.shape
     features = inputs(rollout.observation)
-    output = forward(policy.layers, features.view(seeds, lanes * times, -1)).view(seeds, -1, lanes, times)
+    output = policy.passes().forward(features.reshape(seeds, lanes * times, -1)).reshape(seeds, -1, lanes, times)
     mean, values = output[:, :-1, :, :-1], output[:, -1]
-    log_std = policy.layers.log_std
-    action = torch.from_numpy(rollout.action).permute(0, 3, 1, 2)
-    deviation = ((action - mean) * torch.exp(-log_std)[..., None]).reshape(*log_std.shape[:2], -1)
-    log_prob = ppo.log_probability(deviation, log_std).view(seeds, lanes, -1)
-    return features[:, :, :-1], log_prob, values.double().numpy()
+    log_std = policy.layers.log_std.numpy()
+    action = rollout.action.transpose(0, 3, 1, 2)
+    deviation = ((action - mean) * np.exp(-log_std)[..., None]).reshape(*log_std.shape[:2], -1)
+    log_prob = ppo.log_probability(deviation, log_std).reshape(seeds, lanes, -1)
+    return features[:, :, :-1], log_prob, values.astype(np.float64)
 
 
 def _summary(reward: Array, extra: Array, rollout: Rollout, plan: Plan, radius: float) -> Rows:
@@ -269,9 +270,9 @@ def _explained(values: Array, targets: Array) -> Array:
         return np.where(variance > 0, 1 - (targets - values).var(axis=1) / variance, np.nan)
 
 
-def _shuffles(cell: Cell, seeds: Sequence[int], iteration: int) -> Tensor:
+def _shuffles(cell: Cell, seeds: Sequence[int], iteration: int) -> NDArray[np.int64]:
     """Return each seed's own sample orders [S, epochs, N] of one iteration."""
     settings = cell.protocol.ppo
     base = np.tile(np.arange(settings.rollout_steps), (settings.epochs, 1))
     generators = [stream(cell.root_seed, Purpose.SHUFFLES, seed, iteration) for seed in seeds]
-    return torch.from_numpy(np.stack([generator.permuted(base, axis=1) for generator in generators]))
+    return np.stack([generator.permuted(base, axis=1) for generator in generators])
