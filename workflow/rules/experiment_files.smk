@@ -1,4 +1,6 @@
 # What a further study is made of and makes, by its name.
+import yaml
+
 from reacher_shaping.settings.outputs import VIEWS, table_files, views
 
 
@@ -28,10 +30,15 @@ def figures_of(experiment):
     return expand("figures/{experiment}_{view}.{kind}", experiment=experiment, view=views_of(experiment), kind=KINDS)
 
 
+HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())}
+
+
 def tables_of(experiment):
     """Files of an experiment's tables."""
     settings = STUDY.experiments[experiment]
-    files = table_files(switches=settings.switches is not None, peers=settings.peers is not None)
+    files = table_files(
+        switches=settings.switches is not None, peers=settings.peers is not None, hypotheses=experiment in HYPOTHESES
+    )
     return [f"results/experiments/{experiment}/{file}" for file in files]
 
 

@@ -114,6 +114,27 @@ rule measure_effects:
         "../scripts/measure_effects.py"
 
 
+rule judge_hypotheses:
+    input:
+        runs="results/experiments/{experiment}/runs.parquet",
+        progress=of_blocks("progress.parquet"),
+    output:
+        **tables_made("judge_hypotheses", "{experiment}"),
+    log:
+        "results/logs/experiments/{experiment}/hypotheses.log",
+    benchmark:
+        "results/benchmarks/experiments/{experiment}/hypotheses.tsv"
+    wildcard_constraints:
+        experiment=one_of(HYPOTHESES),
+    threads: 1
+    params:
+        ledger=lambda wildcards: as_json(HYPOTHESES[wildcards.experiment] | {"dated": None}),
+        cells=of_experiment(block_cells),
+        code=code("judge_hypotheses"),
+    script:
+        "../scripts/judge_hypotheses.py"
+
+
 rule compare_with_peers:
     input:
         runs="results/experiments/{experiment}/runs.parquet",

@@ -56,6 +56,9 @@ def section(
     if "effects" in shown:
         said.append(effects_sentence(given["effects"]))
         found[say("study_tables.effects")] = study_tables.effects(given["effects"])
+    if "hypotheses" in given:
+        said.append(hypotheses_sentence(given["hypotheses"]))
+        found[say("study_tables.hypotheses")] = study_tables.hypotheses(given["hypotheses"])
     if "correlation" in shown:
         said.append(correlation_sentence(given["correlation"]))
         found[say("study_tables.correlation")] = study_tables.correlation(given["correlation"], main)
@@ -100,6 +103,13 @@ def within(metric: str) -> str:
     """A measure's name as it stands within a sentence."""
     heading = say(f"measures.{metric}")
     return heading[0].lower() + heading[1:]
+
+
+def hypotheses_sentence(table: pd.DataFrame) -> str:
+    """How many of our own hypotheses the runs support, contradict and leave open."""
+    counts = table["verdict"].value_counts()
+    named = {verdict: int(counts.get(verdict, 0)) for verdict in ("supported", "contradicted", "open")}
+    return say("study_sentences.hypotheses", hypotheses=len(table), **named)
 
 
 def best_sentence(cells: pd.DataFrame) -> str:

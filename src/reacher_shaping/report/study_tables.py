@@ -66,6 +66,17 @@ def effects(table: pd.DataFrame) -> Grid:
     return Grid(headings, [entries for _, entries in sorted(rows, key=lambda row: row[0])], frozenset({0, 1, 2}))
 
 
+def hypotheses(table: pd.DataFrame) -> Grid:
+    """A row per hypothesis: what it says, both cells, their difference with interval and p, and the verdict."""
+    rows = []
+    for row in table.to_dict("records"):
+        means = [f"{row[side]}: {number(row[f'mean_{side}'], 3)}" for side in ("a", "b")]
+        solved = " / ".join(number(row[f"solved_{side}"], 1) for side in ("a", "b"))
+        apart = interval(row, "difference", "ci_low", "ci_high", 3)
+        rows.append([row["id"], row["claim"], *means, apart, p_value(row["p_holm"]), solved, row["verdict"]])
+    return Grid(list(entry("tables.hypotheses")), rows, frozenset({0, 1, 2, 3, 7}))
+
+
 def correlation(table: pd.DataFrame, main: pd.DataFrame | None = None) -> Grid:
     """A row per pair of the paper: published, over the same cells and over all of the study, single seeds.
 

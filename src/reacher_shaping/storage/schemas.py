@@ -49,6 +49,7 @@ PEERS = Table({"algorithm": TEXT, "seed": INTEGER, "budget": INTEGER}, measures=
 EFFECTS = Table(
     {"variant": TEXT, "switch": TEXT, "setting": TEXT, "effect": TEXT, "metric": TEXT, "seeds": INTEGER}, measures=True
 )
+HYPOTHESES = Table({"id": TEXT, "claim": TEXT, "a": TEXT, "b": TEXT, "predicts": TEXT, "verdict": TEXT}, measures=True)
 AGREEMENT = Table(
     {"algorithm": TEXT, "budget": INTEGER, "metric": TEXT, "our_seeds": INTEGER, "their_seeds": INTEGER}, measures=True
 )

@@ -210,6 +210,9 @@ EXPERIMENT_TABLES = {
         ("plot_experiment", *REPORT),
         always=False,
     ),
+    "hypotheses": Entry(
+        "hypotheses.csv", schemas.HYPOTHESES, "a hypothesis of our own", "judge_hypotheses", REPORT, always=False
+    ),
     "agreement": Entry(
         "agreement.csv",
         schemas.AGREEMENT,
@@ -219,7 +222,8 @@ EXPERIMENT_TABLES = {
         always=False,
     ),
 }
-"""Tables of a further study, in `results/experiments/{study}/`; `effects` needs switches, `agreement` needs peers."""
+"""Tables of a further study, in `results/experiments/{study}/`; `effects` needs switches, `agreement` peers,
+`hypotheses` a ledger."""
 
 
 def made_by(rule: str, tables: Mapping[str, Entry], folder: str) -> dict[str, str]:

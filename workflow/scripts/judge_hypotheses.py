@@ -1,0 +1,21 @@
+"""Judge our own hypotheses on an experiment by the tests fixed before its runs."""
+
+import json
+
+import pandas as pd
+from job import logged
+
+from reacher_shaping.analysis import hypotheses
+from reacher_shaping.storage import block_schemas, schemas
+from reacher_shaping.storage.files import read_table, write_table
+from reacher_shaping.storage.provenance import unchanged
+
+given, params = snakemake.input, snakemake.params
+
+with logged(snakemake.log[0]):
+    runs = read_table(given.runs, schemas.RUNS)
+    blocks = zip(params.cells, given.progress, strict=True)
+    parts = [read_table(unchanged(path), block_schemas.PROGRESS).assign(**cell) for cell, path in blocks]
+    take_off = hypotheses.take_off_frame(pd.concat(parts, ignore_index=True))
+    judged = hypotheses.verdicts(runs, take_off, json.loads(params.ledger))
+    write_table(snakemake.output.hypotheses, judged, schemas.HYPOTHESES)
