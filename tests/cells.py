@@ -11,6 +11,7 @@ VARIANTS = {
     "l2sq": Variant(name="l2sq", potential="l2sq"),
     "exponential": Variant(name="exponential", potential="l2", schedule="exponential", horizon=300),
     "cosine": Variant(name="cosine", potential="l2", schedule="cosine", horizon=300),
+    "bilevel": Variant(name="bilevel", potential="l2", schedule="bilevel", rate=0.5),
     "success": Variant(name="success", potential="l2", schedule="success", rate=0.2),
     "decay": Variant(name="decay", potential="l2", schedule="linear", horizon=3000),
 }

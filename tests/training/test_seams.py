@@ -4,9 +4,10 @@ import sys
 
 import numpy as np
 import pandas as pd
+import plain_loop
 import pytest
 import torch
-from cells import small
+from cells import fresh_policy, small
 from toys import point_mass
 
 from reacher_shaping.evaluation.evaluate import evaluate
@@ -15,9 +16,12 @@ from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Shap
 from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.files import write_table
 from reacher_shaping.tasks.base import Lanes
+from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training import schedules
+from reacher_shaping.training.alignment import alignment
+from reacher_shaping.training.rollout import Collector, Plan
 from reacher_shaping.training.shaping import Schedule
-from reacher_shaping.training.train import train
+from reacher_shaping.training.train import _outputs, train
 
 FALLING = Schedule(
     start=lambda seeds: {"success": np.zeros(seeds)},
@@ -130,7 +134,7 @@ def test_the_state_of_a_weight_survives_a_checkpoint(tmp_path):
     pd.testing.assert_frame_equal(resumed.progress_frame(), whole.progress_frame(), check_exact=True)
 
 
-def test_the_success_schedule_is_one_less_the_moving_average_of_each_seeds_success(tmp_path):
+def test_the_success_schedule_is_one_less_the_moving_average_of_each_seeds_success():
     cell = small("success", alpha0=50.0, iterations=5)
     state = trained(cell, [0, 1], radius=0.15)
     average = np.zeros(2)
@@ -138,8 +142,52 @@ def test_the_success_schedule_is_one_less_the_moving_average_of_each_seeds_succe
         np.testing.assert_allclose(alpha, 50 * (1 - average), rtol=1e-12)
         average += 0.2 * (success - average)
     assert average.min() > 0
+
+
+@pytest.mark.parametrize("variant", ["success", "bilevel"])
+def test_an_adaptive_weight_survives_a_kill_with_the_same_bits_in_every_block(variant, tmp_path):
+    cell = small(variant, alpha0=50.0, iterations=5)
+    state = trained(cell, [0, 1], radius=0.15)
+    assert len(np.unique(state.progress["alpha"])) > 5, "the weights must move, each seed's its own way"
     path = tmp_path / "key" / "checkpoint.pt"
     save_checkpoint(path, trained(cell, [0, 1], radius=0.15, iterations=3))
     resumed = trained(cell, [0, 1], state=load_checkpoint(path)[0], radius=0.15)
     assert torch.equal(resumed.rows, state.rows)
     pd.testing.assert_frame_equal(resumed.progress_frame(), state.progress_frame(), check_exact=True)
+    alone = trained(cell, [1], radius=0.15)
+    assert torch.equal(alone.rows[0], state.rows[1])
+    np.testing.assert_array_equal(alone.progress["alpha"][0], state.progress["alpha"][1])
+
+
+def test_the_alignment_is_the_cosine_of_the_policy_gradients_that_autograd_gives():
+    """One network of torch.nn a seed; rewards to come summed plainly, episode by episode."""
+    cell = small("l2", alpha0=3.0)
+    policy, plan = fresh_policy([0, 1], 7), Plan(192, 50)
+    rollout = Collector(TASK, [0, 1], 7, plan).collect(policy, 0)
+    rng = np.random.default_rng(0)
+    reward, shaping = rng.normal(size=(2, 2, 4, 50))
+    features, log_prob, _ = _outputs(policy, rollout)
+    found = alignment(policy, features, rollout.action, log_prob, reward, shaping, plan, cell.protocol.ppo)
+    for seed in range(2):
+        network = plain_loop.Network()
+        network.load_state_dict({name: tensor[seed] for name, tensor in policy.weights().items()})
+        network.double()
+        gradients = []
+        for terms, decay in ((reward[seed], 0.99), (shaping[seed], 0.99 * 0.95)):
+            to_come = np.zeros((4, 50))
+            for lane, length in enumerate(plan.lengths):
+                for t in range(length):
+                    to_come[lane, t] = sum(decay ** (k - t) * terms[lane, k] for k in range(t, length))
+            to_come -= to_come[:3].mean(0)
+            network.zero_grad()
+            for lane, length in enumerate(plan.lengths):
+                distribution, _ = network(torch.from_numpy(rollout.observation[seed, lane, :length]))
+                chosen = torch.from_numpy(rollout.action[seed, lane, :length]).double()
+                (distribution.log_prob(chosen).sum(-1) * torch.from_numpy(to_come[lane, :length])).sum().backward()
+            parts = [p.grad.flatten() for p in network.parameters() if p.grad is not None]
+            gradients.append(torch.cat(parts))
+        expected = torch.nn.functional.cosine_similarity(*gradients, dim=0).item()
+        assert found[seed] == pytest.approx(expected, abs=1e-4)
+        assert abs(expected) > 1e-3
+    same = alignment(policy, features, rollout.action, log_prob, reward, 0 * shaping, plan, cell.protocol.ppo)
+    assert same.tolist() == [0, 0]

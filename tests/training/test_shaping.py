@@ -184,3 +184,32 @@ def test_with_lambda_1_and_no_potential_at_the_end_shaping_is_a_baseline_of_the_
     taken = np.array([[True] * 10] * 2 + [[True] * 7 + [False] * 3])
     distance = np.random.default_rng(0).uniform(0, 0.4, (2, 3, 11))[..., :-1][:, taken]
     np.testing.assert_allclose(shaped - plain, 50 * distance, atol=1e-5)
+
+
+def test_heuristic_guided_learning_adds_a_guess_of_the_next_value_and_shortens_the_horizon():
+    """r + (1 - l) gamma h(s') with the discount l gamma (Cheng et al. 2021, eq. 4): by hand at half of the decay."""
+    decay = Variant(name="d", potential="l2", schedule="linear", horizon=100)
+    shaping = rule(decay, alpha0=10.0, discount=0.9, form="hurl", mixing=0.2, episode_end="bootstrap")
+    distance = np.array([[[0.4, 0.3, 0.1]]])
+    terms = shaping.reward(distance, np.array([[50, 51]]), np.array([[False, True]]), {})
+    np.testing.assert_allclose(terms[0, 0], [0.1 * 0.9 * 10 * -0.3, 0.1 * 0.9 * 10 * -0.1])
+    assert [shaping.discount_at({}, steps) for steps in (0, 50, 100)] == pytest.approx([0.9 * 0.8, 0.9 * 0.9, 0.9])
+    assert rule(decay, alpha0=10.0, discount=0.9).discount_at({}, 0) == 0.9
+    assert not shaping.reward(distance, np.array([[100, 101]]), np.array([[False, True]]), {}).any()
+
+
+def test_heuristic_guided_learning_is_temporal_difference_towards_the_guess_where_nothing_else_counts():
+    """With l = 0 a step is judged by its reward and the guess of the state it leads to, and by nothing after it."""
+    shaping = rule(VARIANTS["l2"], alpha0=5.0, discount=0.9, form="hurl", mixing=1.0, episode_end="bootstrap")
+    distance, values = np.random.default_rng(0).uniform(0, 1, (2, 1, 1, 4))
+    reward, ends = np.zeros((1, 1, 3)), np.array([[False, False, True]])
+    shaped = reward + shaping.reward(distance, np.arange(3)[None], ends, {})
+    advantages = gae(
+        shaped, values[..., :-1], values[..., 1:], ends, discount=shaping.discount_at({}, 0), gae_lambda=0.95
+    )
+    np.testing.assert_allclose(advantages, 0.9 * 5 * -distance[..., 1:] - values[..., :-1])
+
+
+def test_one_discount_for_all_runs_is_refused_with_a_weight_for_each():
+    with pytest.raises(ValueError, match=r"form = 'hurl'.*schedule = 'success'"):
+        rule(VARIANTS["success"], form="hurl")

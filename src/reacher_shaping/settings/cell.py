@@ -29,7 +29,7 @@ else:  # what there is, read from the code without running it
 
 DECAYING = ("linear", "exponential", "cosine")
 """Schedules of a horizon."""
-ADAPTIVE = ("success",)
+ADAPTIVE = ("success", "bilevel")
 """Schedules of a rate."""
 
 
@@ -112,8 +112,11 @@ class PPO(Settings):
 class Shaping(Settings):
     """How the shaping reward is formed, and what holds at the last step of an episode."""
 
-    form: Literal["paper", "dynamic"] = "paper"
-    """`paper`: alpha(t) (gamma Phi(s') - Phi(s)); `dynamic`: with the weight inside the difference."""
+    form: Literal["paper", "dynamic", "hurl"] = "paper"
+    """`paper`: alpha(t) (gamma Phi(s') - Phi(s)); `dynamic`: with the weight inside the difference; `hurl`: the
+    potential as a guess of the value, under a shorter horizon (Cheng et al. 2021)."""
+    mixing: Fraction = 0.1
+    """Share of the guess in `hurl` at t = 0, where the discount is gamma (1 - mixing); the schedule takes it to 0."""
     episode_end: Literal["terminal", "bootstrap"] = "terminal"
     """The value after an episode's last step: 0 (`terminal`), or the critic's (`bootstrap`)."""
     terminal_potential: Literal["keep", "zero"] = "keep"
@@ -212,6 +215,11 @@ class Cell(Settings):
             )
         if self.variant.potential == "none" and self.alpha0 != 1 and self.protocol.shaping.start_weight == "alpha0":
             raise ValueError(f"alpha0 = {self.alpha0} has no meaning with variant '{self.variant.name}'; allowed: 1")
+        if self.protocol.shaping.form == "hurl" and self.variant.schedule in ADAPTIVE:
+            raise ValueError(
+                f"shaping.form = 'hurl' has one discount for all runs, and schedule = {self.variant.schedule!r} a "
+                "weight for each; allowed: a schedule that depends on the steps alone"
+            )
         return self
 
     @property

@@ -11,6 +11,9 @@ import numpy as np
 from reacher_shaping.settings.cell import Variant
 from reacher_shaping.training.shaping import Array, Schedule, State
 
+_RANGE = (1e-3, 10.0)
+"""Shares of alpha0 that an aligned weight stays within."""
+
 
 def _stateless(weight: Callable[[Variant, Array], Array]) -> Schedule:
     """Return a schedule of the variant and the environment steps alone."""
@@ -50,6 +53,11 @@ def _averaged_success(variant: Variant, state: State, measured: Mapping[str, Arr
     return {"success": state["success"] + variant.rate * (measured["success_rate"] - state["success"])}
 
 
+def _followed_alignment(variant: Variant, state: State, measured: Mapping[str, Array]) -> State:
+    assert variant.rate is not None, "settings refuse a bilevel schedule without a rate"
+    return {"log": np.clip(state["log"] + variant.rate * measured["alignment"], *np.log(_RANGE))}
+
+
 constant = _stateless(_always_one)
 """1 for ever (paper, section 3.4)."""
 linear = _stateless(_falling_line)
@@ -67,4 +75,17 @@ success = Schedule(
 
 The reward-adaptive decay that the paper names as future work (section 6); the average moves by the variant's rate an
 iteration: s <- s + rate (success - s), from 0.
+"""
+bilevel = Schedule(
+    start=lambda seeds: {"log": np.zeros(seeds)},
+    weight=lambda variant, state, env_steps: _per_seed(np.exp(state["log"]), env_steps),
+    update=_followed_alignment,
+    aligned=True,
+)
+"""A weight that grows while shaping pulls where the task's own return does, and shrinks where it pulls against it.
+
+Multiplied each iteration by exp(rate cos), cos the cosine of their policy gradients: the scalar case of the bi-level
+weights of Hu et al. 2020 ("Learning to utilize shaping rewards"), with the gradient of the outer level taken as Du et
+al. 2018 take it ("Adapting auxiliary losses using gradient similarity"). It stays between a thousandth and ten times
+alpha0.
 """

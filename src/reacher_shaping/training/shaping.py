@@ -27,11 +27,13 @@ class Schedule(NamedTuple):
         weight: (variant, state, environment steps of training done [...]) -> share of alpha0, [...] or [S, ...].
         update: (variant, state, measures of the iteration by name, [S] each) -> the state of the next iteration.
             No number of one seed may meet one of another.
+        aligned: whether the measures shall hold `alignment`, see `training.alignment`.
     """
 
     start: Callable[[int], State]
     weight: Callable[[Variant, State, Array], Array]
     update: Callable[[Variant, State, Mapping[str, Array]], State]
+    aligned: bool = False
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,9 @@ class Rule:
             2012, eq. 3). `terminal_potential` "zero" takes Phi = 0 in the state after a last step,
             which invariance needs if that state's value counts as zero (Grzes 2017); the paper keeps
             it. With "bootstrap" ends the next state's value counts, so its potential is always kept.
+            "hurl" is heuristic-guided learning (Cheng, Kolobov & Swaminathan 2021, eq. 4): r + (1 - l) gamma h(s'),
+            with the discount l gamma and l = 1 - `mixing` times the schedule's share; h = alpha0 Phi is a guess of the
+            value. It shortens the horizon as long as l is below 1.
     """
 
     potential: Potential
@@ -74,6 +79,16 @@ class Rule:
         """Return the shaping weight after `env_steps` environment steps of training [...]: [...] or [S, ...]."""
         return self.alpha0 * self.schedule.weight(self.variant, state, np.asarray(env_steps, dtype=np.float64))
 
+    def discount_at(self, state: State, env_steps: int) -> float:
+        """Return the discount of the iteration that begins after `env_steps` environment steps of training."""
+        if self.settings.form != "hurl":
+            return self.discount
+        return self.discount * (1 - self._mixing(state, env_steps))
+
+    def _mixing(self, state: State, env_steps: int) -> float:
+        """Return 1 - l of an iteration; the settings refuse a schedule with a state, which has one for each seed."""
+        return self.settings.mixing * float(self.alpha(state, env_steps)) / self.alpha0
+
     def reward(self, distance: Array, env_steps: NDArray[np.int64], ends: NDArray[np.bool_], state: State) -> Array:
         """Return the shaping term F [S, L, T] of every step of a rollout.
 
@@ -87,6 +102,8 @@ class Rule:
         before, after = phi[..., :-1], phi[..., 1:]
         if self.settings.terminal_potential == "zero" and self.settings.episode_end == "terminal":
             after = np.where(ends, 0.0, after)
+        if self.settings.form == "hurl":
+            return self._mixing(state, int(env_steps.flat[0])) * self.discount * self.alpha0 * after
         weight = self.alpha(state, env_steps)
         if self.settings.form == "dynamic":
             return self.discount * self.alpha(state, env_steps + 1) * after - weight * before

@@ -19,6 +19,7 @@ from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.storage.block_schemas import MEASURES
 from reacher_shaping.tasks.base import Task, load_task
 from reacher_shaping.training import advantage, ppo
+from reacher_shaping.training.alignment import alignment
 from reacher_shaping.training.network import Shape, silent
 from reacher_shaping.training.policy import Policy, initialise, inputs
 from reacher_shaping.training.rollout import Collector, Plan, Rollout
@@ -159,8 +160,8 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
             measured["logged_return"] = measured["episode_return"]
         state.unlogged = rest
         state.schedule = rule.schedule.update(cell.variant, state.schedule, measured)
-        for name, values in measured.items():
-            state.progress[name][:, state.iteration] = values
+        for name, values in state.progress.items():
+            values[:, state.iteration] = measured[name]
         state.iteration += 1
         yield state
 
@@ -177,7 +178,6 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
 
     Args:
         shaped: [S, E] shaped returns of the rollout's whole episodes.
-        schedule: the state of the shaping weight's schedule.
         unlogged: [S] shaped return of the rollout before, after its last whole episode. The running sum of an
             episode is not cleared where a rollout starts, so the first episode's contains it. With the paper's 40
             episodes a rollout the first is not among the last ten, so it never shows there.
@@ -199,7 +199,7 @@ def prepare(
 
     Samples stand in the order of the sequential rollout. The summary also holds `episode_returns`
     [S, E], unshaped, `shaped_returns` [S, E], and `rest` [S], the shaped return of the steps after the last
-    whole episode.
+    whole episode; and `alignment` [S] where the schedule asks for it.
     """
     settings, plan, environment = cell.protocol.ppo, state.plan, cell.protocol.environment
     reward = task.rewards[environment.reward](
@@ -213,7 +213,7 @@ def prepare(
         values[..., :-1],
         following,
         plan.ends,
-        discount=settings.discount,
+        discount=rule.discount_at(state.schedule, state.iteration * plan.steps),
         gae_lambda=settings.gae_lambda,
     )
     advantages, fitted = plan.sequence(advantages), plan.sequence(values[..., :-1])
@@ -225,10 +225,11 @@ def prepare(
         advantage.normalise(advantages),
         targets,
     )
-    return records, {
-        **_summary(reward, extra, rollout, plan, radius),
-        "explained_variance": _explained(fitted, targets),
-    }
+    summary = _summary(reward, extra, rollout, plan, radius) | {"explained_variance": _explained(fitted, targets)}
+    if rule.schedule.aligned:
+        acted = (features, rollout.action, log_prob)
+        summary["alignment"] = alignment(state.policy(), *acted, reward, extra, plan, settings)
+    return records, summary
 
 
 @silent
