@@ -50,7 +50,7 @@ def test_unreachable_target_is_approached_as_far_as_the_arm_allows(distance):
 def test_reach_succeeds_always_and_beats_doing_nothing(weight):
     settings = SETTINGS | {"environment": Environment(control_weight=weight), "mode": "deterministic", "episodes": 40}
     frame = evaluate(controllers.reach(controllers.TUNED_GAINS[weight]), [0], **settings)
-    idle = evaluate(controllers.zero, [0], **settings)
+    idle = evaluate(controllers.still(2), [0], **settings)
     assert frame["final_success"].all()
     assert frame["episode_return"].mean() > idle["episode_return"].mean() + 5
 
@@ -88,8 +88,9 @@ def test_evaluation_of_a_controller_equals_stepping_gymnasium_under_monitor():
 def test_random_torques_have_their_distributions():
     noise = np.random.default_rng(2).standard_normal((1, 5000, 2), dtype=np.float32)
     observation = np.zeros((1, 5000, 10))
-    uniform = controllers.uniform(observation, noise)
-    clipped = controllers.clipped_gaussian(observation, noise)
+    uniform = controllers.uniform(1.0)(observation, noise)
+    clipped = controllers.clipped_gaussian(1.0)(observation, noise)
+    assert np.abs(controllers.uniform(2.0)(observation, noise)).max() > 1.9
     assert np.quantile(uniform, [0, 0.25, 0.5, 0.75, 1]) == pytest.approx([-1, -0.5, 0, 0.5, 1], abs=0.03)
     assert np.abs(clipped).max() == 1
     assert (clipped == noise)[np.abs(noise) < 1].all()
@@ -97,7 +98,7 @@ def test_random_torques_have_their_distributions():
 
 def test_random_policy_without_noise_is_refused():
     with pytest.raises(ValueError, match="needs noise"):
-        controllers.uniform(np.zeros((1, 1, 10)), None)
+        controllers.uniform(1.0)(np.zeros((1, 1, 10)), None)
 
 
 def test_controllers_table_has_a_row_each_with_intervals_around_the_means():
@@ -144,6 +145,6 @@ def share_by_gymnasium(act, episodes):
 
 def test_share_within_radius_counts_every_step_and_no_reset():
     frame = episode_lengths.evaluate_lengths(
-        controllers.zero, [0], mode="deterministic", episodes=7, lengths=(10,), **SETTINGS | {"radius": 10.0}
+        controllers.still(2), [0], mode="deterministic", episodes=7, lengths=(10,), **SETTINGS | {"radius": 10.0}
     )
     assert frame["share_within_radius"].item() == 1

@@ -1,7 +1,7 @@
 """Reference policies that need no learning: the floor and the ceiling beside every trained policy.
 
-Each is an actor for `evaluate.evaluate`: (observation [S, L, 10], standard normal noise [S, L, 2] or None) ->
-torques [S, L, 2]. They are evaluated on the resets, and with the draws, of the trained policies.
+Each is an actor for `evaluate.evaluate`: (observation [S, L, F], standard normal noise [S, L, A] or None) ->
+actions [S, L, A]. They are evaluated on the resets, and with the draws, of the trained policies.
 """
 
 from collections.abc import Sequence
@@ -41,15 +41,14 @@ Stronger torques arrive sooner and cost more, so the best gains depend on the we
 """
 
 
-def zero(observation: Array, noise: Noise) -> Array:
-    """No torque. Observations [S, L, 10] -> torques [S, L, 2]."""
-    return np.zeros((*observation.shape[:-1], 2))
+def still(actions: int) -> Actor:
+    """No action, of A numbers."""
+    return lambda observation, noise: np.zeros((*observation.shape[:-1], actions))
 
 
-def uniform(observation: Array, noise: Noise) -> Array:
-    """Torques uniform in [-1, 1]: the normal draws [S, L, 2] through their own distribution function."""
-    torque: Array = 2 * distributions.norm.cdf(_required(noise)) - 1
-    return torque
+def uniform(limit: float) -> Actor:
+    """Actions uniform in [-limit, limit]: the normal draws through their own distribution function."""
+    return lambda observation, noise: limit * (2 * distributions.norm.cdf(_required(noise)) - 1)
 
 
 def gaussian(observation: Array, noise: Noise) -> NDArray[np.float32]:
@@ -57,9 +56,9 @@ def gaussian(observation: Array, noise: Noise) -> NDArray[np.float32]:
     return _required(noise)
 
 
-def clipped_gaussian(observation: Array, noise: Noise) -> NDArray[np.float32]:
-    """Standard normal torques clipped to [-1, 1]."""
-    return _required(noise).clip(-1.0, 1.0)
+def clipped_gaussian(limit: float) -> Actor:
+    """Standard normal actions clipped to [-limit, limit]."""
+    return lambda observation, noise: _required(noise).clip(-limit, limit)
 
 
 def untrained_network(root_seed: int, task: str, settings: PPO) -> Actor:
@@ -69,7 +68,7 @@ def untrained_network(root_seed: int, task: str, settings: PPO) -> Actor:
 
 
 def reach(gains: Gains) -> Actor:
-    """Inverse kinematics and PD control: torques that lead the joints to angles with the tip on the target.
+    """Inverse kinematics and PD control of Reacher: torques that lead the joints to angles with the tip on the target.
 
     Of the two solutions (elbow left or right) the one that needs less turning is taken, anew at every step. Torques
     are clipped to [-1, 1].
@@ -125,16 +124,18 @@ def evaluate_controllers(
     mean_return_high`, and the means `final_success_rate, final_distance, min_distance` (m), `reward_distance,
     reward_control`. Both intervals are over episodes.
     """
-    control_weight = environment.control_weight
+    task, control_weight = load_task(environment.task), environment.control_weight
     gains = TUNED_GAINS[min(TUNED_GAINS, key=lambda weight: abs(weight - control_weight))]
     actors: Sequence[tuple[str, Mode, Actor]] = [
-        ("zero action", "deterministic", zero),
-        ("uniform random", "stochastic", uniform),
+        ("zero action", "deterministic", still(task.action_size)),
+        ("uniform random", "stochastic", uniform(task.action_limit)),
         ("unit Gaussian", "stochastic", gaussian),
-        ("unit Gaussian, clipped", "stochastic", clipped_gaussian),
+        ("unit Gaussian, clipped", "stochastic", clipped_gaussian(task.action_limit)),
         ("untrained network", "stochastic", untrained_network(root_seed, environment.task, network or PPO())),
         ("inverse kinematics + PD", "deterministic", reach(gains)),
     ]
+    if environment.task != "reacher":
+        actors = actors[:-1]
     rows = []
     for name, mode, act in actors:
         frame = evaluate(

@@ -42,8 +42,8 @@ def evaluate(
         mode: "stochastic" samples actions (the paper's evaluation), "deterministic" takes the mean.
         episodes: episodes a seed.
         radius: m; success is a distance of at most `radius` after any step, final success after the last.
-        environment: the task, its reward, and whether actions are clipped to [-1, 1] before the step, so that the
-            control cost is on the clipped.
+        environment: the task, its reward, and whether actions are clipped to the task's limit before the step, so that
+            the control cost is on the clipped.
         root_seed: keys the resets and the noise, common to all policies.
         steps: length of an episode; None for the task's own.
     """
@@ -60,7 +60,7 @@ def evaluate(
             draws = np.broadcast_to(noise[:, t], (*shape, task.action_size)).copy() if mode == "stochastic" else None
             action = act(lanes.observation.reshape(*shape, -1), draws)
             if environment.clip_actions:
-                action = action.clip(-1.0, 1.0)
+                action = action.clip(-task.action_limit, task.action_limit)
             lanes.step(action.reshape(-1, task.action_size))
             measured[:, :, t] = lanes.measured.reshape(*shape, -1)
             control[..., t] = environment.control_weight * control_cost(action)

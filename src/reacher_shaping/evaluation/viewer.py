@@ -46,7 +46,9 @@ def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, roo
             draws = noise.standard_normal((task.episode_steps, task.action_size), dtype=np.float32)
             for draw in draws:
                 action = act(observation[None, None], draw[None, None] if mode == "stochastic" else None)[0, 0]
-                observation, reward, *_ = shown.step(action.clip(-1, 1) if environment.clip_actions else action)
+                observation, reward, *_ = shown.step(
+                    action.clip(-task.action_limit, task.action_limit) if environment.clip_actions else action
+                )
                 total += float(reward)
                 if _closed(arm):
                     break

@@ -34,7 +34,7 @@ ADAPTIVE = ("success", "bilevel")
 
 
 class Environment(Settings):
-    """The task and its reward, the weight of the control cost, and whether actions are clipped to [-1, 1]."""
+    """The task and its reward, the weight of the control cost, and whether actions are clipped."""
 
     task: TaskName = "reacher"
     """What is simulated, observed and rewarded; a file of `tasks/`."""
@@ -45,7 +45,7 @@ class Environment(Settings):
     control_weight: NonNegative = 0.1
     """Reward taken per squared unit of action."""
     clip_actions: bool = False
-    """Whether actions are clipped to [-1, 1] before they are applied and charged."""
+    """Whether actions are clipped to the task's limit, 1 for Reacher, before they are applied and charged."""
 
     def radius(self, default: float) -> float:
         """Return the distance to the goal in m that counts as success, where `default` is the evaluation's."""

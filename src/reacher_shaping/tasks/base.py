@@ -8,6 +8,7 @@ import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple, Protocol
@@ -53,6 +54,7 @@ class Task:
         episode_steps: environment steps of an episode; every episode has as many.
         observation_size: F.
         action_size: A.
+        action_limit: greatest size of an action's numbers that has an effect; where actions are clipped, here.
         measures: names of what is measured after each step [M]; the first is the distance to the goal in m, which
             success and the potentials read.
         fields: the fields of `Data` that the functions below use.
@@ -63,6 +65,8 @@ class Task:
             episode's resets [N, D].
         rewards: the rewards that can be chosen, by name.
         bounds: what results must keep to.
+        settle: changes the state after an environment step, before all positions are computed anew; None where the
+            environment leaves them as the last solver step did.
     """
 
     gymnasium_id: str
@@ -81,6 +85,8 @@ class Task:
     observe: Callable[[Data, Array, Array, Array], None]
     rewards: Mapping[str, Reward]
     bounds: Bounds
+    settle: Callable[[Data], None] | None = None
+    action_limit: float = 1.0
 
 
 def load_task(name: str) -> Task:
@@ -129,7 +135,22 @@ class Lanes:
             raise ValueError(f"actions of shape {action.shape} for {self.count} lanes of {self.task.action_size}")
         self.task.control(self.data, action)
         self.batch.step(nstep=self.task.frame_skip)
+        if self.task.settle:
+            self.task.settle(self.data)
+            self.batch.forward()
         self.task.observe(self.data, self._draws, self.observation, self.measured)
+
+
+def gymnasium_asset(name: str) -> Path:
+    """Return the path of a model that the installed Gymnasium ships.
+
+    Found without importing Gymnasium, which would load its renderers in every training job.
+    Raises FileNotFoundError if Gymnasium is not installed.
+    """
+    package = find_spec("gymnasium")
+    if package is None or package.origin is None:
+        raise FileNotFoundError(f"gymnasium is not installed: its {name} is the model")
+    return Path(package.origin).parent / "envs" / "mujoco" / "assets" / name
 
 
 def finite_controls(action: NDArray[np.floating]) -> NDArray[np.floating]:

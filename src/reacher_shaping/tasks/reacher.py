@@ -12,14 +12,11 @@ Actions are two torques in [-1, 1], clamped by the actuators. Source: gymnasium/
 reacher.xml.
 """
 
-from importlib.util import find_spec
-from pathlib import Path
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from reacher_shaping.tasks.base import Array, Bounds, Data, Task, finite_controls
+from reacher_shaping.tasks.base import Array, Bounds, Data, Task, finite_controls, gymnasium_asset
 
 TARGET_ORIGIN = np.array([0.1, -0.1, 0.01])
 """m; position of the target's body in reacher.xml, and the reference of its two slides."""
@@ -27,21 +24,9 @@ TIP = 3
 """The fingertip among the bodies."""
 
 
-def model_file() -> Path:
-    """Return the path of the reacher.xml that the installed Gymnasium ships.
-
-    Found without importing Gymnasium, which would load its renderers in every training job.
-    Raises FileNotFoundError if Gymnasium is not installed.
-    """
-    package = find_spec("gymnasium")
-    if package is None or package.origin is None:
-        raise FileNotFoundError("gymnasium is not installed: its reacher.xml is the model")
-    return Path(package.origin).parent / "envs" / "mujoco" / "assets" / "reacher.xml"
-
-
 def load_model() -> mujoco.MjModel:
     """Load Gymnasium's reacher model."""
-    return mujoco.MjModel.from_xml_path(str(model_file()))
+    return mujoco.MjModel.from_xml_path(str(gymnasium_asset("reacher.xml")))
 
 
 def arm_model() -> mujoco.MjModel:
@@ -51,7 +36,7 @@ def arm_model() -> mujoco.MjModel:
     it ends its iterations, so that the bits at a joint limit are those of the whole.
     """
     whole = load_model()
-    arm = mujoco.MjSpec.from_file(str(model_file()))
+    arm = mujoco.MjSpec.from_file(str(gymnasium_asset("reacher.xml")))
     arm.delete(arm.body("target"))
     for body in arm.bodies[1:]:
         given = whole.body(body.name)

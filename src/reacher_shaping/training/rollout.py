@@ -120,7 +120,8 @@ class Collector:
         return [self.task.draw_reset(generator) for generator in generators for _ in range(self.plan.lanes)]
 
     def _applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
-        return action.clip(-1.0, 1.0) if self.clip_actions else action
+        limit = self.task.action_limit
+        return action.clip(-limit, limit) if self.clip_actions else action
 
     def _noise(self, iteration: int) -> NDArray[np.float32]:
         shape = (self.plan.lanes, self.plan.episode_steps, self.task.action_size)
