@@ -85,7 +85,6 @@ class Adam:
         """Return the state before the first step for parameters [S, P]."""
         return cls(torch.zeros_like(rows), torch.zeros_like(rows))
 
-    @torch.no_grad()
     def step(self, rows: Tensor, gradient: Tensor, learning_rate: float, epsilon: float) -> None:
         """Change `rows` [S, P] in place, by the kernel that torch.optim.Adam(fused=True) calls."""
         self.steps += 1
@@ -168,7 +167,8 @@ class Learner:
             ratio = np.exp(log_prob - samples.log_prob)
         # Where clipping binds, the minimum is the clipped term, which does not depend on the policy.
         surrogate = ratio * advantage
-        gradient = surrogate * (surrogate <= ratio.clip(1 - clip, 1 + clip) * advantage)
+        clipped = np.minimum(np.maximum(ratio, 1 - clip), 1 + clip) * advantage
+        gradient = surrogate * (surrogate <= clipped)
         return gradient.mean(1) if pairs else gradient
 
     def _clip(self) -> None:
