@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 QUICK := --directory build/quick --configfile workflow/quick.yaml
-FROM_TABLES := plot_figures plot_further plot_experiment format_tables run_notebook
+FROM_TABLES := plot_figures plot_experiment format_tables run_notebook
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 

@@ -41,7 +41,6 @@ rule all:
         TABLES,
         RUN_RADII,
         FIGURES,
-        FURTHER_FIGURES,
         FORMATTED_TABLES,
         NOTEBOOKS,
         MEDIA,

@@ -7,7 +7,6 @@ import synthetic
 from scipy import stats as scipy_stats
 
 from reacher_shaping.analysis.baselines import peer_table
-from reacher_shaping.figures.baselines import peer_strip
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.html import budgets_sentence
 
@@ -63,26 +62,6 @@ def test_peer_that_diverged_is_counted(cells):
     table = peer_table(peers, cells)
     assert paper_tables.readable(table).set_index("Policy").loc["SAC", "Seeds"] == "3 (1 diverged)"
     assert table.set_index("policy").loc["SAC", "mean_return"] == -5.5
-
-
-def test_strip_has_a_dot_per_seed_in_both_panels(cells, controllers):
-    runs = synthetic.runs(synthetic.PAPER_GRID, 4)
-    figure = peer_strip(synthetic.peers(), runs, cells, controllers)
-    success, back = figure.axes
-    none = runs[runs["variant"] == "none"]
-    for axes, metric in ((success, "success_rate"), (back, "mean_return")):
-        dots = [x for line in axes.lines if line.get_label() == "_runs" for x in line.get_xdata()]
-        assert sorted(dots) == sorted([*synthetic.peers()[metric], *none[metric]])
-    assert [label.get_text() for label in success.get_yticklabels()] == [
-        "PPO · 500K", "SAC · 100K", "TD3 · 100K", "none (this study) · 500K", "none (this study) · 1M",
-        "inverse kinematics + PD",
-    ]  # fmt: skip
-
-
-def test_no_peer_is_said(cells):
-    empty = synthetic.peers().iloc[:0]
-    figure = peer_strip(empty, synthetic.runs(synthetic.PAPER_GRID, 4), cells)
-    assert figure.axes[0].texts[0].get_text() == "not in this study"
 
 
 def test_study_without_an_unshaped_cell_shows_the_peers_alone(cells):

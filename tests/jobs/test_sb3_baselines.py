@@ -97,7 +97,7 @@ def _snakemake(folder, *arguments):
 
 def _planned(folder):
     """Inputs and outputs of each job of a dry run."""
-    rules = ["plot_figures", "plot_further", "format_tables", "run_notebook", "build_reference_report"]
+    rules = ["plot_figures", "format_tables", "run_notebook", "build_reference_report"]
     said = _snakemake(folder, "--dry-run", "--allowed-rules", *rules)
     jobs = re.findall(r"^rule (\w+):\n    input: (.*)\n    output: (.*)$", said, re.MULTILINE)
     return {rule: (inputs.split(", "), outputs.split(", ")) for rule, inputs, outputs in jobs}
@@ -118,8 +118,8 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
         if there:
             write_table(table, synthetic.peers(), schemas.PEERS)
         jobs = _planned(tmp_path)
-        assert ("results/peers.parquet" in jobs["plot_further"][0]) is there
-        assert ("figures/peers.svg" in jobs["plot_further"][1]) is there
+        assert ("results/peers.parquet" in jobs["plot_figures"][0]) is there
+        assert ("figures/peers.svg" in jobs["plot_figures"][1]) is there
         report = jobs["build_reference_report"][0]
         assert ("results/peers.parquet" in report, "figures/peers.svg" in report) == (there, there)
         assert "train_peer" not in jobs
@@ -127,7 +127,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     _touch(tmp_path, made)  # only what shows the peers is made
     other = tmp_path / "seeds.yaml"
     other.write_text("seeds: 77\n")
-    rules = ["judge_claims", "plot_further", "build_reference_report"]
+    rules = ["judge_claims", "plot_figures", "build_reference_report"]
     _snakemake(tmp_path, "--configfile", other, "--forcerun", "judge_claims", "--allowed-rules", *rules)
     claims = read_table(tmp_path / "results" / "claims.csv", schemas.CLAIMS).set_index("id")
     assert claims.loc["C19", "verdict"] != "untestable"

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from reacher_shaping.analysis import comparisons, learning_curves, single_seed_studies
 from reacher_shaping.analysis.baselines import peer_table
 from reacher_shaping.analysis.runs import LEARNED
-from reacher_shaping.figures import paper
+from reacher_shaping.figures.style import save
 from reacher_shaping.report import captions, html, paper_tables
 from reacher_shaping.report.summary import short_number, summary
 from reacher_shaping.settings.study import load_study
@@ -81,7 +81,7 @@ def _inputs(folder, study, grid, seeds, **changes):
     cells = synthetic.cells(grid, seeds)
     sizes = {"figure_1": (2, 1), "figure_2": (1, 2), "lottery": (1, 1), "forest": (2, 2), "peers": (3, 1)}
     figures = {name: Figure(figsize=size) for name, size in sizes.items()}
-    paths = {name: paper.save(figure, folder / "figures" / name, ("svg", "pdf"))[0] for name, figure in figures.items()}
+    paths = {name: save(figure, folder / "figures" / name, ("svg", "pdf"))[0] for name, figure in figures.items()}
     (folder / "media").mkdir()
     for key in grid:
         for kind in ("gif", "mp4"):

@@ -9,8 +9,6 @@ from switched import runs as switched_runs
 
 from reacher_shaping.analysis import comparisons, switch_effects
 from reacher_shaping.analysis.baselines import agreement_frame
-from reacher_shaping.figures import studies
-from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.report import paper_tables, study_sections, study_tables
 
 LOGS = pd.DataFrame(
@@ -42,79 +40,6 @@ def released():
 @pytest.fixture(scope="module")
 def section(released):
     return study_sections.section("released", released, LOGS, synthetic.correlation())
-
-
-def test_effects_figure_has_each_difference_with_its_interval(effects):
-    figure = studies.effects(effects)
-    for axes, metric in zip(figure.axes, studies.EFFECT_LABELS, strict=True):
-        drawn = sorted(line.get_xdata()[0] for line in axes.lines if line.get_label() == "_effect")
-        shown = effects[(effects["metric"] == metric) & (effects["effect"] != "interaction")]
-        assert drawn == pytest.approx(sorted(shown["difference"]))
-    axes = figure.axes[0]
-    shown = effects[(effects["metric"] == "success_rate") & (effects["effect"] != "interaction")]
-    filled = [line for line in axes.lines if line.get_label() == "_effect" and line.get_markerfacecolor() != "white"]
-    assert len(filled) == ((shown["ci_low"] > 0) | (shown["ci_high"] < 0)).sum() > 0
-    assert [label.get_text() for label in axes.get_yticklabels()] == [
-        "all switches", "a\nepochs 10 to 5", "b\ndiscount 0.99 to 0.5",
-    ]  # fmt: skip
-
-
-def test_effects_without_rows_are_an_empty_figure(effects):
-    assert to_bytes(studies.effects(effects.head(0)), "svg")
-
-
-def test_cells_figure_has_a_dot_per_run_in_every_panel(released):
-    controllers = synthetic.controllers().assign(protocol="released", mode="stochastic", final_success_rate=1.0)
-    controllers.loc[3, "controller"] = "inverse kinematics + PD"
-    figure = studies.cells(released["runs"], released["cells"], controllers)
-    for axes, metric in zip(figure.axes, studies.STRIP, strict=True):
-        dots = [x for line in axes.lines if line.get_label() == "_runs" for x in line.get_xdata()]
-        assert sorted(dots) == pytest.approx(sorted(released["runs"][metric]))
-    ceilings = [line.get_xdata()[0] for axes in figure.axes for line in axes.lines if line.get_label() == "_controller"]
-    rows = (released["cells"]["protocol"] == "released").sum()  # the other protocol has no controllers here
-    assert sorted(ceilings) == sorted([1.0, 1.0, -3.7] * rows)
-    without = studies.cells(released["runs"], released["cells"])
-    assert not [line for axes in without.axes for line in axes.lines if line.get_label() == "_controller"]
-
-
-def test_log_figure_sets_the_published_peak_and_end_beside_the_curve_of_the_same_budget():
-    key = {"protocol": "released", "variant": "none", "alpha0": 1.0, "seeds": 5, "low": np.nan, "high": np.nan}
-    parts = [
-        pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": -50.0, "budget": budget, **key})
-        for budget in (500_000, 1_000_000)
-    ]
-    parts.append(parts[0].assign(alpha0=0.5))  # a label of other runs than the published log's
-    figure = studies.log(pd.concat(parts), LOGS)
-    marks = [line for axes in figure.axes for line in axes.lines if line.get_label() == "_published"]
-    assert [list(line.get_xdata()) for line in marks] == [[33, 245]]
-    assert [list(line.get_ydata()) for line in marks] == [[-38.6, -87.2]]
-    assert marks[0] in figure.axes[0].lines
-
-
-def test_log_figure_shows_the_moving_average_in_which_the_published_log_is_told():
-    key = {"protocol": "released", "variant": "none", "budget": 500_000, "seeds": 5, "low": np.nan, "high": np.nan}
-    curve = -50 - 10 * np.sin(np.arange(245.0))
-    parts = [
-        pd.DataFrame({"iteration": np.arange(1, 246), "episode_return": curve, "alpha0": a, **key}) for a in range(5)
-    ]
-    figure = studies.log(pd.concat(parts).sample(frac=1, random_state=2), LOGS)
-    shown = [axes for axes in figure.axes if axes.get_visible()]
-    assert len(shown) == 5
-    assert shown[2].get_position().y1 < shown[0].get_position().y0, "more than three settings stand in rows of two"
-    line = next(line for line in shown[0].lines if line.get_label() == "none")
-    np.testing.assert_allclose(line.get_ydata(), np.convolve(curve, np.ones(20) / 20, mode="valid"))
-    assert (line.get_xdata()[0], line.get_xdata()[-1]) == (20, 245)
-
-
-def test_correlation_figure_has_a_panel_each_for_the_published_and_ours(released):
-    figure = studies.correlation(released["correlation"])
-    titles = [axes.get_title(loc="left") for axes in figure.axes[:2]]
-    assert titles == ["Published Table 2", "Released code, labels as published"]
-    table = released["correlation"]
-    for axes, level in zip(figure.axes[:2], ("published", "cells"), strict=True):
-        chosen = table[(table["level"] == level) & (table["method"] == "pearson")]
-        own = chosen[(chosen["x"] == "alpha0") & (chosen["y"] == "mean_return")]["r"].iloc[0]
-        assert any(text.get_text().startswith(f"{own:.2f}") for text in axes.texts), level
 
 
 def test_section_tells_the_correlation_beside_the_published_one(section):

@@ -10,7 +10,7 @@ import pytest
 import synthetic
 
 from reacher_shaping.analysis.agreement import agreement, compare
-from reacher_shaping.figures import bars
+from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.readme import headline, put_headline, sections
@@ -60,7 +60,7 @@ def test_readme_says_what_the_reference_tables_hold():
 
 @needs_reference
 def test_headline_figure_is_drawn_from_the_reference_tables(tmp_path):
-    figure = bars.figure_2(read("cells.parquet"), published(), controllers=read("controllers.parquet"))
+    figure = paper.figure_2(read("cells.parquet"), published(), controllers=read("controllers.parquet"))
     save(figure, tmp_path / "figure_2")
     assert (tmp_path / "figure_2.svg").read_text() == (KEPT / "headline.svg").read_text()
 

@@ -1,11 +1,11 @@
 # From the study's tables to the paper's figures, further ones, and formatted tables.
 KINDS = ["svg", "pdf", "png"]
-FIGURES = expand("figures/figure_{number}.{kind}", number=[1, 2, 3, 4], kind=KINDS)
-FURTHER_FIGURES = expand(
-    "figures/{name}.{kind}",
-    name=["seed_strip", "forest", "success_by_radius", "long_episodes", "lottery"] + (["peers"] if PEERS else []),
-    kind=KINDS,
-)
+# A figure is a function of `figures/paper.py` or `figures/robustness.py`, its name here, and its title and caption in
+# the report's text file.
+FIGURE_NAMES = ["figure_1", "figure_2", "figure_3", "figure_4"]
+FIGURE_NAMES += ["seed_strip", "forest", "improvement", "success_by_radius", "long_episodes", "lottery"]
+FIGURE_NAMES += ["peers"] if PEERS else []
+FIGURES = expand("figures/{name}.{kind}", name=FIGURE_NAMES, kind=KINDS)
 FORMATTED_TABLES = expand(
     "results/tables/{name}.{kind}",
     name=["table_1", "table_2", "table_3", "behaviour", "learning"],
@@ -17,6 +17,7 @@ rule plot_figures:
     input:
         **PUBLISHED,
         **tables_read("plot_figures"),
+        peers=PEERS,
     output:
         FIGURES,
     log:
@@ -25,28 +26,11 @@ rule plot_figures:
         "results/benchmarks/plot_figures.tsv"
     threads: 1
     params:
+        names=FIGURE_NAMES,
+        radius=STUDY.evaluation.radius,
         code=code("plot_figures"),
     script:
         "../scripts/plot_figures.py"
-
-
-rule plot_further:
-    input:
-        **PUBLISHED,
-        **tables_read("plot_further"),
-        peers=PEERS,
-    output:
-        FURTHER_FIGURES,
-    log:
-        "results/logs/plot_further.log",
-    benchmark:
-        "results/benchmarks/plot_further.tsv"
-    threads: 1
-    params:
-        radius=STUDY.evaluation.radius,
-        code=code("plot_further"),
-    script:
-        "../scripts/plot_further.py"
 
 
 rule format_tables:

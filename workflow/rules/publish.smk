@@ -10,7 +10,6 @@ rule build_crate:
             TABLES,
             RUN_RADII,
             FIGURES,
-            FURTHER_FIGURES,
             FORMATTED_TABLES,
             NOTEBOOKS,
             MEDIA,

@@ -5,12 +5,14 @@ from pathlib import Path
 import pandas as pd
 from job import logged
 
-from reacher_shaping.figures import studies
+from reacher_shaping.figures import drawing
+from reacher_shaping.figures.style import save
 from reacher_shaping.storage.reference import read_studies
 
 given, wildcards = snakemake.input, snakemake.wildcards
 
 with logged(snakemake.log[0]):
     tables = read_studies(path for path in given if "/experiments/" in path)[wildcards.experiment]
-    figure = studies.draw(wildcards.view, tables, pd.read_csv(given.training_logs))
-    studies.save(figure, Path("figures") / f"{wildcards.experiment}_{wildcards.view}")
+    tables = {**tables, "training_logs": pd.read_csv(given.training_logs)}
+    figure = drawing.draw(wildcards.view, tables, drawing.STUDY)
+    save(figure, Path("figures") / f"{wildcards.experiment}_{wildcards.view}")

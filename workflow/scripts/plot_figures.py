@@ -1,30 +1,23 @@
-"""Draw the paper's four figures."""
+"""Draw the main study's figures: the paper's four and those it does not have."""
 
 from pathlib import Path
 
 import pandas as pd
 from job import logged
 
-from reacher_shaping.figures import bars, paper
+from reacher_shaping.figures.drawing import draw
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import paper_tables
-from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table
+from reacher_shaping.storage.tables import STUDY_TABLES
 
-given = snakemake.input
+given, params = snakemake.input, snakemake.params
 
 with logged(snakemake.log[0]):
-    cells = read_table(given.cells, schemas.CELLS)
-    curves = read_table(given.curves, schemas.CURVES)
-    correlation = read_table(given.correlation, schemas.CORRELATION)
-    theirs = read_table(given.correlation_published, schemas.CORRELATION)
-    controllers = read_table(given.controllers, schemas.CONTROLLERS)
-    published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
-    figures = {
-        "figure_1": paper.figure_1(curves),
-        "figure_2": bars.figure_2(cells, published, controllers=controllers),
-        "figure_3": paper.figure_3(correlation, theirs),
-        "figure_4": paper.figure_4(curves),
+    files = {Path(path).name: path for path in given}
+    tables = {
+        name: read_table(files[entry.file], entry.schema) for name, entry in STUDY_TABLES.items() if entry.file in files
     }
-    for name, figure in figures.items():
-        save(figure, Path("figures") / name)
+    published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
+    for name in params.names:
+        save(draw(name, {**tables, "published": published, "radius": params.radius}), Path("figures") / name)

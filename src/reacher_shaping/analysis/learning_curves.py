@@ -78,6 +78,18 @@ def smooth(curves: ArrayLike, window: int = WINDOW) -> NDArray[np.float64]:
     return means
 
 
+def smoothed(curves: pd.DataFrame) -> pd.DataFrame:
+    """The curves of a table as `curve_table` gives it, each its moving average over `WINDOW` iterations.
+
+    A value stands at the last iteration of its window; the limits of the interval, which do not average, are left out.
+    """
+    parts = []
+    for _, line in curves.sort_values("iteration").groupby(KEY, sort=False):
+        means = smooth(line["episode_return"])[0]
+        parts.append(line.iloc[-len(means) :].assign(episode_return=means, low=np.nan, high=np.nan))
+    return pd.concat(parts, ignore_index=True)
+
+
 def peak(curves: ArrayLike, window: int = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Peak of the smoothed curve [S] and the number of iterations done by then [S]; NaN if diverged."""
     values = np.atleast_2d(np.asarray(curves, dtype=float))

@@ -11,7 +11,7 @@ import pandas as pd
 
 from reacher_shaping.analysis.comparisons import corrected, only_cell
 from reacher_shaping.analysis.learning_curves import WINDOW
-from reacher_shaping.figures import studies
+from reacher_shaping.figures import drawing
 from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.labels import setting_label, variant_label
@@ -92,7 +92,8 @@ def document(
         own = section(name, own_tables, training_logs, main, published)
         parts += [f"## {own.title}", own.intro, *own.sentences]
         for figure in own.figures:
-            drawn = studies.draw(figure.removeprefix(f"{name}_"), own_tables, training_logs)
+            tables = {**own_tables, "training_logs": training_logs}
+            drawn = drawing.draw(figure.removeprefix(f"{name}_"), tables, drawing.STUDY)
             picture = base64.b64encode(to_bytes(drawn, "svg")).decode()
             parts.append(f'<img alt="{figure}" src="data:image/svg+xml;base64,{picture}">')
         parts += [f"{caption}:\n\n{text_tables.to_markdown(grid)}" for caption, grid in own.grids.items()]

@@ -71,14 +71,14 @@ STUDY_TABLES = {
             "check_results",
             "judge_claims",
             "format_tables",
-            "plot_further",
+            "plot_figures",
             *REPORT,
         ),
     ),
     "cells": Entry(
         *_AGGREGATED["cells"],
         "aggregate_runs",
-        ("check_results", "format_tables", "plot_figures", "plot_further", *REPORT),
+        ("check_results", "format_tables", "plot_figures", *REPORT),
     ),
     "curves": Entry(*_AGGREGATED["curves"], "aggregate_runs", ("plot_figures",)),
     "correlation": Entry(
@@ -108,7 +108,7 @@ STUDY_TABLES = {
         schemas.CONTROLLERS,
         "a policy that needs no learning, and a mode",
         "evaluate_controllers",
-        ("judge_claims", "plot_figures", "plot_further", *REPORT),
+        ("judge_claims", "plot_figures", *REPORT),
     ),
     "run_radii": Entry(
         "run_radii.parquet", schemas.RUN_RADII, "a run, mode and success radius", "summarise_episodes", always=False
@@ -118,7 +118,7 @@ STUDY_TABLES = {
         schemas.RADII,
         "a cell, mode and success radius",
         "summarise_episodes",
-        ("plot_further", *REPORT),
+        ("plot_figures", *REPORT),
     ),
     "long_episodes": Entry(
         "long_episodes.parquet",
@@ -132,14 +132,14 @@ STUDY_TABLES = {
         schemas.LENGTHS,
         "a cell, mode and length of episodes",
         "summarise_episodes",
-        ("plot_further", *REPORT),
+        ("plot_figures", *REPORT),
     ),
     "comparisons": Entry(
         "comparisons.parquet",
         schemas.COMPARISONS,
         "a pair of cells and a measure, paired by seed",
         "compare_runs",
-        ("plot_further", *REPORT),
+        ("plot_figures", *REPORT),
     ),
     "variance": Entry(
         "variance.parquet", schemas.VARIANCE, "a cell: its variance from seeds and evaluation", "compare_runs", REPORT
@@ -152,7 +152,7 @@ STUDY_TABLES = {
         schemas.LOTTERY,
         "a statement that a study of one seed a cell might make",
         "compare_runs",
-        ("plot_further", *REPORT),
+        ("plot_figures", *REPORT),
     ),
     "winners": Entry(
         "winners.csv", schemas.WINNERS, "a cell: how often it wins a study of one seed a cell", "compare_runs", REPORT
