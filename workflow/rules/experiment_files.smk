@@ -37,7 +37,10 @@ def tables_of(experiment):
     """Files of an experiment's tables."""
     settings = STUDY.experiments[experiment]
     files = table_files(
-        switches=settings.switches is not None, peers=settings.peers is not None, hypotheses=experiment in HYPOTHESES
+        switches=settings.switches is not None,
+        peers=settings.peers is not None,
+        hypotheses=experiment in HYPOTHESES,
+        lengths=settings.lengths,
     )
     return [f"results/experiments/{experiment}/{file}" for file in files]
 

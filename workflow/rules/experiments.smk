@@ -114,6 +114,25 @@ rule measure_effects:
         "../scripts/measure_effects.py"
 
 
+rule summarise_lengths:
+    input:
+        long_episodes=of_blocks("long_episodes.parquet"),
+    output:
+        **tables_made("summarise_lengths", "{experiment}"),
+    log:
+        "results/logs/experiments/{experiment}/lengths.log",
+    benchmark:
+        "results/benchmarks/experiments/{experiment}/lengths.tsv"
+    wildcard_constraints:
+        experiment=one_of(name for name, study in STUDY.experiments.items() if study.lengths),
+    threads: 1
+    params:
+        cells=of_experiment(block_cells),
+        code=code("summarise_lengths"),
+    script:
+        "../scripts/summarise_lengths.py"
+
+
 rule judge_hypotheses:
     input:
         runs="results/experiments/{experiment}/runs.parquet",

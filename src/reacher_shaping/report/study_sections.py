@@ -56,6 +56,8 @@ def section(
     if "effects" in shown:
         said.append(effects_sentence(given["effects"]))
         found[say("study_tables.effects")] = study_tables.effects(given["effects"])
+    if "lengths" in given:
+        found[say("study_tables.lengths")] = study_tables.lengths(given["lengths"])
     if "hypotheses" in given:
         said.append(hypotheses_sentence(given["hypotheses"]))
         found[say("study_tables.hypotheses")] = study_tables.hypotheses(given["hypotheses"])

@@ -66,6 +66,19 @@ def effects(table: pd.DataFrame) -> Grid:
     return Grid(headings, [entries for _, entries in sorted(rows, key=lambda row: row[0])], frozenset({0, 1, 2}))
 
 
+def lengths(table: pd.DataFrame) -> Grid:
+    """A row per cell and length of episodes: where the tip is at the end, and how much of the time on the target."""
+    rows = []
+    for row in table.to_dict("records"):
+        texts = [
+            interval(row, name, f"{name}_low", f"{name}_high", *decimals(name))
+            for name in ("success_rate", "final_success_rate", "share_within_radius", "final_distance")
+        ]
+        named = [protocol_label(row["protocol"]), variant_label(row["variant"])]
+        rows.append([*named, setting_label(row["budget"], row["alpha0"]), str(row["steps"]), *texts])
+    return Grid(list(entry("tables.lengths")), rows, frozenset({0, 1, 2}))
+
+
 def hypotheses(table: pd.DataFrame) -> Grid:
     """A row per hypothesis: what it says, both cells, their difference with interval and p, and the verdict."""
     rows = []

@@ -8,9 +8,9 @@ from reacher_shaping.storage.tables import EXPERIMENT_TABLES
 VIEWS = ("cells", "effects", "log", "correlation", "forest")
 
 
-def table_files(*, switches: bool, peers: bool, hypotheses: bool = False) -> list[str]:
-    """Return the files of a study's tables: those of all, and of one that has `switches`, `peers` or `hypotheses`."""
-    has = {"effects": switches, "agreement": peers, "hypotheses": hypotheses}
+def table_files(*, switches: bool, peers: bool, hypotheses: bool = False, lengths: bool = False) -> list[str]:
+    """Return the files of a study's tables: those of all, and those of a study that has what is named."""
+    has = {"effects": switches, "agreement": peers, "hypotheses": hypotheses, "lengths": lengths}
     return [entry.file for name, entry in EXPERIMENT_TABLES.items() if has.get(name, True)]
 
 

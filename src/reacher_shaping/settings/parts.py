@@ -106,6 +106,8 @@ class Experiment(Settings):
     """Root of the study's own random streams, so that its runs share none with others; without it the main study's."""
     grid: Annotated[tuple[Row, ...], BeforeValidator(to_tuple)] = ()
     """Rows of cells."""
+    lengths: bool = False
+    """Whether its policies are evaluated on longer episodes too, as the main study's are."""
     switches: Switches | None = None
     """Two protocols and the differences between them, each alone or taken back."""
     peers: Peers | None = None

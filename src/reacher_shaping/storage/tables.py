@@ -210,6 +210,14 @@ EXPERIMENT_TABLES = {
         ("plot_experiment", *REPORT),
         always=False,
     ),
+    "lengths": Entry(
+        "lengths.parquet",
+        schemas.LENGTHS,
+        "a cell, mode and length of episodes",
+        "summarise_lengths",
+        REPORT,
+        always=False,
+    ),
     "hypotheses": Entry(
         "hypotheses.csv", schemas.HYPOTHESES, "a hypothesis of our own", "judge_hypotheses", REPORT, always=False
     ),
@@ -223,7 +231,7 @@ EXPERIMENT_TABLES = {
     ),
 }
 """Tables of a further study, in `results/experiments/{study}/`; `effects` needs switches, `agreement` peers,
-`hypotheses` a ledger."""
+`hypotheses` a ledger, and `lengths` to be asked for."""
 
 
 def made_by(rule: str, tables: Mapping[str, Entry], folder: str) -> dict[str, str]:
