@@ -222,7 +222,7 @@ def test_a_label_may_be_given_to_the_baseline():
         ("protocols.paper.ppo.discount", 1.5, ["protocols.paper.ppo.discount = 1.5", "less than or equal to 1"]),
         ("protocols.paper.ppo.epochs", 10.5, ["protocols.paper.ppo.epochs = 10.5", "integer"]),
         ("protocols.paper.environment.clip_actions", 1, ["clip_actions = 1", "boolean"]),
-        ("protocols.paper.shaping.form", "new", ["form = 'new'", "'paper' or 'dynamic'"]),
+        ("protocols.paper.shaping.form", "new", ["form = 'new'", "'paper', 'dynamic' or 'hurl'"]),
         ("protocols.tables", {}, ["'tables'", "allowed: any other name"]),
         ("protocols.Paper 2", {}, ["Paper 2", "pattern"]),
         ("protocols.paper.name", "other", ["protocols.paper.name = 'other'", "must equal its key"]),
