@@ -106,3 +106,9 @@ def test_rendering_shows_the_tip_where_the_drawing_does():
         again = picture(POSITION)
     assert green_centre(pixels) == pytest.approx(expected_centre(TIP, 200), abs=5)
     assert (pixels == again).all()
+
+
+def test_a_task_of_which_there_are_no_pictures_is_refused_by_name():
+    settings = SETTINGS | {"environment": Environment(task="pusher")}
+    with pytest.raises(ValueError, match="no pictures of the task pusher; allowed: reacher"):
+        video.evaluation_episode(reach(TUNED_GAINS[1.0]), 0, **settings)

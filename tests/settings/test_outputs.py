@@ -37,6 +37,7 @@ def test_the_studies_of_the_configuration_have_theirs():
         "standard": ["cells", "log", "forest"],
         "tuned": ["cells", "log"],
         "sparse": ["cells", "log", "forest"],
+        "weights": ["cells", "log", "forest"],
         "tasks": ["cells", "log", "forest"],
         "long": ["cells", "log"],
         "ablation": ["cells", "effects"],

@@ -54,7 +54,12 @@ class Episode:
 def evaluation_episode(
     act: Actor, seed: int, *, mode: Mode, radius: float, environment: Environment, root_seed: int
 ) -> Episode:
-    """Return the first evaluation episode of a policy; `act` is an actor of S = 1, `seed` its name."""
+    """Return the first evaluation episode of a policy; `act` is an actor of S = 1, `seed` its name.
+
+    Raises ValueError for another task than Reacher, of which alone there are pictures.
+    """
+    if environment.task != "reacher":
+        raise ValueError(f"there are no pictures of the task {environment.task}; allowed: reacher")
     seen: list[NDArray[np.float64]] = []
     latest: NDArray[np.float64] = np.empty(0)
 

@@ -28,13 +28,16 @@ def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, roo
     """Show episodes on the study's evaluation resets, until the last or until the window is closed.
 
     `act` is an actor of S = 1. Returns the mean return of the episodes shown to their end, NaN if there are none.
-    Raises NoDisplayError.
+    Raises NoDisplayError, and ValueError for a task that is not among Gymnasium's own environments.
     """
     require_display()
     import gymnasium  # not above: the other commands do without it
 
-    task = load_task(environment.task)
-    shown = gymnasium.make(task.gymnasium_id, render_mode="human", reward_control_weight=environment.control_weight)
+    task, weight = load_task(environment.task), environment.control_weight
+    try:
+        shown = gymnasium.make(task.gymnasium_id, render_mode="human", reward_control_weight=weight)
+    except gymnasium.error.Error as error:
+        raise ValueError(f"{environment.task} has no window: {error}") from None
     arm: Any = shown.unwrapped
     resets, noise = stream(root_seed, Purpose.EVALUATION_RESETS), stream(root_seed, Purpose.EVALUATION_ACTIONS)
     returns: list[float] = []
