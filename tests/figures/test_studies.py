@@ -121,3 +121,32 @@ def test_log_figure_sets_the_unshaped_runs_beside_the_shaped_ones_of_another_wei
     (axes,) = studies.log(pd.concat(parts), LOGS).axes
     assert sorted(drawn.curves(axes, synthetic.MAIN)) == ["l2", "none"]
     assert axes.get_title(loc="left") == "tuned\n500K, α₀ = 3.6"
+
+
+def test_dose_figure_has_a_dot_per_run_and_each_mean_at_its_weight():
+    rng = np.random.default_rng(0)
+    keys = [("p", "none", 1.0), ("p", "l2", 1.0), ("p", "l2", 10.0), ("p", "l2", 50.0), ("q", "l2", 1.0)]
+    runs = pd.DataFrame(
+        [
+            {"protocol": protocol, "variant": variant, "budget": 500, "alpha0": alpha0, "seed": seed}
+            | {"final_success_rate": rng.uniform()}
+            for protocol, variant, alpha0 in keys
+            for seed in range(4)
+        ]
+    )
+    means = runs.groupby(["protocol", "variant", "budget", "alpha0"], as_index=False)["final_success_rate"].mean()
+    cells = means.assign(
+        final_success_rate_low=means["final_success_rate"] - 0.1,
+        final_success_rate_high=means["final_success_rate"] + 0.1,
+    )
+    figure = studies.dose(runs, cells)
+    (axes,) = figure.axes  # the other protocol has one weight
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["none", "1", "10", "50"]
+    offsets = np.concatenate(
+        [np.asarray(part.get_offsets()) for part in axes.collections if len(part.get_offsets()) > 1]
+    )
+    shown = {(round(float(x)), round(float(y), 9)) for x, y in offsets}
+    places = {("none", 1.0): 0, ("l2", 1.0): 1, ("l2", 10.0): 2, ("l2", 50.0): 3}
+    for frame in (runs, cells):
+        for row in frame[frame["protocol"] == "p"].to_dict("records"):
+            assert (places[row["variant"], row["alpha0"]], round(row["final_success_rate"], 9)) in shown

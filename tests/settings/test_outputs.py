@@ -36,7 +36,7 @@ def test_the_studies_of_the_configuration_have_theirs():
         "attribution": ["cells", "effects"],
         "standard": ["cells", "log", "forest"],
         "tuned": ["cells", "log"],
-        "sparse": ["cells", "log", "forest"],
+        "sparse": ["cells", "dose", "log", "forest"],
         "weights": ["cells", "log", "forest"],
         "tasks": ["cells", "log", "forest"],
         "long": ["cells", "log"],

@@ -24,6 +24,7 @@ from reacher_shaping.figures.style import (
     variant_line,
 )
 from reacher_shaping.labels import KEY, cell_order, setting_label, stochastic, variant_order
+from reacher_shaping.settings.outputs import DOSES
 
 STRIP = {
     "success_rate": "Success, any step",
@@ -77,6 +78,42 @@ def cells(runs: pd.DataFrame, cells: pd.DataFrame, controllers: pd.DataFrame | N
         if len(protocols) > 1:
             parts.shade(axes, [row["protocol"] for row in rows])
     return figure
+
+
+@look()
+def dose(runs: pd.DataFrame, cells: pd.DataFrame) -> Figure:
+    """Success at the last step against the weight of a variant that has several, a panel per protocol.
+
+    A dot per run, a diamond at the mean with its interval; at the left the runs without shaping.
+    """
+    sizes = cells[cells["variant"] != "none"].groupby(["protocol", "variant"])["alpha0"].nunique()
+    chosen = list(sizes[sizes >= DOSES].index)
+    protocols = [name for name in dict.fromkeys(runs["protocol"]) if name in {protocol for protocol, _ in chosen}]
+    points, means = (
+        pd.concat([_at_doses(frame, protocol, variant) for protocol, variant in chosen], ignore_index=True)
+        for frame in (runs, cells)
+    )
+    order = ["none", *(f"{weight:g}" for weight in sorted(set(points.loc[points["weight"] != "none", "alpha0"])))]
+    figure = Figure(figsize=(2.9 * len(protocols) + 0.8, 3.4))
+    panels = {"col": "protocol", "order": protocols}
+    name = "final_success_rate"
+    plot = so.Plot(points, x="weight", y=name).facet(**panels)
+    plot = plot.add(so.Dot(color=QUIET, alpha=0.6, pointsize=5, edgewidth=0), so.Jitter(0.25, seed=0))
+    plot = plot.add(so.Range(color="black"), data=means, ymin=f"{name}_low", ymax=f"{name}_high")
+    plot = plot.add(so.Dot(marker="D", color="black", pointsize=6), data=means)
+    plot = plot.scale(x=so.Nominal(order=order)).limit(y=(-0.03, 1.03)).label(x="", y="Success, last step", col="")
+    for axes, protocol in zip(parts.draw(plot, figure), protocols, strict=True):
+        axes.set_title(protocol_label(protocol))
+        axes.set_xlabel("Weight α₀")
+        percent(axes.yaxis)
+    return figure
+
+
+def _at_doses(frame: pd.DataFrame, protocol: str, variant: str) -> pd.DataFrame:
+    """The rows of a variant and of `none` under a protocol, with the `weight` as text."""
+    own = frame[(frame["protocol"] == protocol) & frame["variant"].isin([variant, "none"])]
+    weights = own["alpha0"].map("{:g}".format)
+    return own.assign(weight=weights.where(own["variant"] != "none", "none"))
 
 
 def compress(axes: Axes, values: "pd.Series[float]") -> None:

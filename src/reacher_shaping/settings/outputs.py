@@ -1,11 +1,14 @@
 """What a further study has, by name: its tables' files and its figures. Nothing heavy is loaded, for the workflow."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES
 
-VIEWS = ("cells", "effects", "log", "correlation", "forest")
+VIEWS = ("cells", "dose", "effects", "log", "correlation", "forest")
+DOSES = 3
+"""Weights of one variant from which on its effect is shown against the weight."""
 
 
 def table_files(*, switches: bool, peers: bool, hypotheses: bool = False, lengths: bool = False) -> list[str]:
@@ -24,8 +27,10 @@ def views(keys: Iterable[Mapping[str, Any]], *, switches: bool) -> list[str]:
     cells = list(keys)
     labels = {cell["alpha0"] for cell in cells if cell["variant"] == "none"}
     variants = {cell["protocol"]: {c["variant"] for c in cells if c["protocol"] == cell["protocol"]} for cell in cells}
+    doses = Counter((cell["protocol"], cell["variant"]) for cell in cells if cell["variant"] != "none")
     shown = {
         "cells": True,
+        "dose": max(doses.values(), default=0) >= DOSES,
         "effects": switches,
         "log": not switches,
         "correlation": len(labels) > 1,  # a baseline of several weights: alpha0 is a label there
