@@ -123,9 +123,10 @@ def test_log_figure_sets_the_unshaped_runs_beside_the_shaped_ones_of_another_wei
     assert axes.get_title(loc="left") == "tuned\n500K, α₀ = 3.6"
 
 
-def test_dose_figure_has_a_dot_per_run_and_each_mean_at_its_weight():
+def test_dose_figure_has_a_dot_per_run_and_each_mean_at_its_weight_under_its_protocol():
     rng = np.random.default_rng(0)
-    keys = [("p", "none", 1.0), ("p", "l2", 1.0), ("p", "l2", 10.0), ("p", "l2", 50.0), ("q", "l2", 1.0)]
+    weights = [("none", 1.0), ("l2", 1.0), ("l2", 10.0), ("l2", 50.0)]
+    keys = [(protocol, *key) for protocol in ("p", "q") for key in weights] + [("r", "l2", 1.0)]
     runs = pd.DataFrame(
         [
             {"protocol": protocol, "variant": variant, "budget": 500, "alpha0": alpha0, "seed": seed}
@@ -134,19 +135,18 @@ def test_dose_figure_has_a_dot_per_run_and_each_mean_at_its_weight():
             for seed in range(4)
         ]
     )
-    means = runs.groupby(["protocol", "variant", "budget", "alpha0"], as_index=False)["final_success_rate"].mean()
-    cells = means.assign(
-        final_success_rate_low=means["final_success_rate"] - 0.1,
-        final_success_rate_high=means["final_success_rate"] + 0.1,
-    )
+    name = "final_success_rate"
+    cells = runs.groupby(["protocol", "variant", "budget", "alpha0"], as_index=False)[name].mean()
+    cells[f"{name}_low"], cells[f"{name}_high"] = cells[name] - 0.1, cells[name] + 0.1
     figure = studies.dose(runs, cells)
-    (axes,) = figure.axes  # the other protocol has one weight
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["none", "1", "10", "50"]
-    offsets = np.concatenate(
-        [np.asarray(part.get_offsets()) for part in axes.collections if len(part.get_offsets()) > 1]
-    )
-    shown = {(round(float(x)), round(float(y), 9)) for x, y in offsets}
-    places = {("none", 1.0): 0, ("l2", 1.0): 1, ("l2", 10.0): 2, ("l2", 50.0): 3}
-    for frame in (runs, cells):
-        for row in frame[frame["protocol"] == "p"].to_dict("records"):
-            assert (places[row["variant"], row["alpha0"]], round(row["final_success_rate"], 9)) in shown
+    assert len(figure.axes) == 2, "the third protocol has one weight"
+    for axes, protocol in zip(figure.axes, ("p", "q"), strict=True):
+        assert [label.get_text() for label in axes.get_xticklabels()] == ["none", "1", "10", "50"]
+        offsets = [np.asarray(part.get_offsets()) for part in axes.collections]
+        marks = [(round(float(x)), float(y)) for x, y in np.concatenate([part for part in offsets if len(part) > 1])]
+        expected = [
+            (weights.index((row["variant"], row["alpha0"])), row[name])
+            for frame in (runs, cells)
+            for row in frame[frame["protocol"] == protocol].to_dict("records")
+        ]
+        np.testing.assert_allclose(sorted(marks), sorted(expected))

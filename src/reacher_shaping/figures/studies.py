@@ -99,8 +99,9 @@ def dose(runs: pd.DataFrame, cells: pd.DataFrame) -> Figure:
     name = "final_success_rate"
     plot = so.Plot(points, x="weight", y=name).facet(**panels)
     plot = plot.add(so.Dot(color=QUIET, alpha=0.6, pointsize=5, edgewidth=0), so.Jitter(0.25, seed=0))
-    plot = plot.add(so.Range(color="black"), data=means, ymin=f"{name}_low", ymax=f"{name}_high")
-    plot = plot.add(so.Dot(marker="D", color="black", pointsize=6), data=means)
+    over_runs = {"data": means, "x": "weight", "y": name, "col": "protocol"}
+    plot = plot.add(so.Range(color="black"), ymin=f"{name}_low", ymax=f"{name}_high", **over_runs)
+    plot = plot.add(so.Dot(marker="D", color="black", pointsize=6), **over_runs)
     plot = plot.scale(x=so.Nominal(order=order)).limit(y=(-0.03, 1.03)).label(x="", y="Success, last step", col="")
     for axes, protocol in zip(parts.draw(plot, figure), protocols, strict=True):
         axes.set_title(protocol_label(protocol))
