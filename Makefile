@@ -50,7 +50,7 @@ else
 	@echo "The report of the reference run: $(CURDIR)/build/reference/report/reference.html"
 endif
 
-compare: $(READY) ## the run in results/ against the reference run, cell by cell
+compare: $(READY) ## the run in results/ against the reference run, cell by cell and verdict by verdict
 	@python workflow/compare_reference.py
 
 check-bits: $(READY) ## retrains the reference run's smallest block, about a minute: the same bits here?

@@ -15,7 +15,7 @@ import pandas as pd
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.readme import headline, put_headline, sections
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.settings.outputs import table_files
+from reacher_shaping.settings.outputs import judged, table_files
 from reacher_shaping.settings.study import block_name, load_study, read_settings, settings_hash
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import ArtifactError, read_json, read_table, write_json, write_text
@@ -38,7 +38,11 @@ def main() -> None:
     bits = published_bits(blocks)
     keep_tables(RESULTS, KEPT)
     files = {
-        name: table_files(switches=own.switches is not None, peers=own.peers is not None)
+        name: table_files(
+            switches=own.switches is not None,
+            peers=own.peers is not None,
+            claims=judged(cell.key for cell in study.experiment_cells[name]),
+        )
         for name, own in study.experiments.items()
     }
     made = keep_experiments(RESULTS, KEPT, files)

@@ -281,6 +281,24 @@ def test_an_untrained_network_does_not_meet_the_claim_about_the_five_best():
     assert claims.claims_frame(LEDGER, found).set_index("id").loc["C16", "interval_verdict"] != "reproduced"
 
 
+def test_a_variant_that_is_trained_as_another_counts_as_both():
+    """The released code's late commit decays L2-squared whatever the label says (D6)."""
+    cells = [("decay200k", 500_000, 0.5), ("decay200k_l2sq", 1_000_000, 0.5), ("none", 500_000, 1.0)]
+    own = make_runs(cells=cells, seeds=3).assign(protocol="late")
+    found = claim_formulas.with_twins(own, {"late": {"decay200k": "decay200k_l2sq"}, "other": {"none": "l2"}})
+    same = found[(found["variant"] == "decay200k_l2sq") & (found["budget"] == 500_000)]
+    assert same["success_rate"].to_list() == own.loc[own["variant"] == "decay200k", "success_rate"].to_list()
+    assert len(found) == len(own) + 3
+    assert not (found["variant"] == "l2").any()
+
+
+def test_second_study_is_judged_by_the_same_tests_and_stands_beside():
+    again = claims.interval_verdicts(claims.judged(LEDGER, Study(make_runs(lambda cell: 0.9)), published()))
+    found = claims.claims_frame(LEDGER, claims.judged(LEDGER, Study(make_runs()), published()), again).set_index("id")
+    assert found.loc["C18", "second_verdict"] == "not reproduced" != found.loc["C18", "interval_verdict"]
+    assert found.loc["C19", "second_verdict"] == "untestable"
+
+
 # What a verdict is worth
 
 

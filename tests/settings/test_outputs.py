@@ -2,7 +2,7 @@
 
 import pytest
 
-from reacher_shaping.settings.outputs import views
+from reacher_shaping.settings.outputs import judged, table_files, views
 from reacher_shaping.settings.study import load_study, read_settings
 
 
@@ -42,3 +42,13 @@ def test_the_studies_of_the_configuration_have_theirs():
         "long": ["cells", "log"],
         "ablation": ["cells", "effects"],
     }
+
+
+def test_claims_are_judged_where_no_two_protocols_have_the_same_cell():
+    study = load_study(read_settings("config.yaml"))
+    found = {name for name, cells in study.experiment_cells.items() if judged(cell.key for cell in cells)}
+    assert {"released", "standard", "tuned"} <= found
+    assert not found & {"attribution", "ablation", "sparse"}
+    files = table_files(switches=False, peers=False, claims=True)
+    assert {"claims.csv", "claim_parts.csv"} <= set(files)
+    assert "claims.csv" not in table_files(switches=False, peers=False, claims=False)

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import synthetic
 
-from reacher_shaping.analysis.agreement import agreement, compare
+from reacher_shaping.analysis.agreement import agreement, compare, compare_verdicts, verdicts_agree
 from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import paper_tables
@@ -105,7 +105,7 @@ def test_further_studies_that_were_made_are_kept(tmp_path):
     write_table(results / "experiments/mine/logs.parquet", logs, schemas.LOGS)
     shutil.copy(KEPT / "curves.parquet", results / "experiments/mine/logged.parquet")
     (kept / "experiments" / "old").mkdir(parents=True)
-    files = outputs.table_files(switches=False, peers=False)
+    files = outputs.table_files(switches=False, peers=False, claims=False)
     assert keep_experiments(results, kept, {"mine": files, "yours": files}) == ["mine"]
     assert [folder.name for folder in (kept / "experiments").iterdir()] == ["mine"]
     assert {path.name for path in (kept / "experiments" / "mine").iterdir()} == set(files)
@@ -145,3 +145,14 @@ def test_headline_goes_between_its_marks_and_needs_them():
     assert put_headline(readme, "new \\1\n") == readme.replace("old", "new \\1")
     with pytest.raises(ValueError, match="marks"):
         put_headline("no marks", "new")
+
+
+def test_verdicts_of_two_studies_stand_side_by_side():
+    ids = ["C1", "C2", "C3", "C4"]
+    ours = pd.DataFrame({"id": ids, "interval_verdict": ["reproduced", "inconclusive", "untestable", "not reproduced"]})
+    other = ["reproduced", "reproduced", "reproduced", "not reproduced"]
+    reference = pd.DataFrame({"id": ids, "interval_verdict": other, "replication": [0.9, 0.4, 1.0, 0.9]})
+    compared = compare_verdicts(ours.assign(replication=0.5), reference)
+    assert compared["same"].to_list() == [True, False, True]
+    assert verdicts_agree(compared) == "Of 3 verdicts 2 are the same, 2.2 were to be expected. Others: C2."
+    assert verdicts_agree(compared.head(0)) == "No claim is tested in both."

@@ -111,6 +111,8 @@ rule judge_claims:
         **tables_read("judge_claims"),
         run_radii=RUN_RADII,
         peers=PEERS,
+        second_runs=source("report/second_study/runs.parquet"),
+        second_long=source("report/second_study/long_episodes.parquet"),
         ledger=source("report/claims.yaml"),
     output:
         **tables_made("judge_claims"),
@@ -120,7 +122,8 @@ rule judge_claims:
         "results/benchmarks/judge_claims.tsv"
     threads: 1
     params:
-        protocol=STUDY.cells[0].protocol.name,
+        protocols=[STUDY.cells[0].protocol.name],
+        twins={},
         code=code("judge_claims"),
     script:
         "../scripts/judge_claims.py"

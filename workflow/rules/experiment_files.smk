@@ -1,7 +1,7 @@
 # What a further study is made of and makes, by its name.
 import yaml
 
-from reacher_shaping.settings.outputs import VIEWS, table_files, views
+from reacher_shaping.settings.outputs import VIEWS, judged, table_files, views
 
 
 def of_experiment(make):
@@ -18,6 +18,19 @@ def peers_of(experiment):
     peers = STUDY.experiments[experiment].peers
     path = f"results/experiments/{experiment}/peers/{{algorithm}}/seed{{seed}}.parquet"
     return expand(path, algorithm=peers.budgets, seed=range(peers.seeds)) if peers else []
+
+
+def twins(cells):
+    """By protocol, variants that it trains as another of the config: `decay_potential` overrides a variant's own."""
+    found = {}
+    for protocol in {cell.protocol.name: cell.protocol for cell in cells}.values():
+        potential = protocol.shaping.decay_potential
+        for variant in STUDY.variants.values():
+            if potential not in ("variant", variant.potential) and variant.schedule != "constant":
+                trained = variant.model_copy(update={"potential": potential})
+                same = [v.name for v in STUDY.variants.values() if v == trained.model_copy(update={"name": v.name})]
+                found.setdefault(protocol.name, {}).update({variant.name: name for name in same})
+    return found
 
 
 def views_of(experiment):
@@ -39,6 +52,7 @@ def tables_of(experiment):
     files = table_files(
         switches=settings.switches is not None,
         peers=settings.peers is not None,
+        claims=judged(cell.key for cell in EXPERIMENTS[experiment]),
         hypotheses=experiment in HYPOTHESES,
         lengths=settings.lengths,
     )

@@ -94,6 +94,26 @@ rule summarise_experiment:
         "../scripts/summarise_experiment.py"
 
 
+use rule judge_claims as judge_experiment with:
+    input:
+        **PUBLISHED,
+        runs="results/experiments/{experiment}/runs.parquet",
+        controllers="results/experiments/{experiment}/controllers.parquet",
+        ledger=source("report/claims.yaml"),
+    output:
+        **tables_made("judge_experiment", "{experiment}"),
+    log:
+        "results/logs/experiments/{experiment}/judge_claims.log",
+    benchmark:
+        "results/benchmarks/experiments/{experiment}/judge_claims.tsv"
+    wildcard_constraints:
+        experiment=one_of(name for name, cells in EXPERIMENTS.items() if judged(cell.key for cell in cells)),
+    params:
+        protocols=of_experiment(lambda cells, seeds: list(dict.fromkeys(cell.protocol.name for cell in cells))),
+        twins=of_experiment(lambda cells, seeds: twins(cells)),
+        code=code("judge_claims"),
+
+
 rule measure_effects:
     input:
         runs="results/experiments/{experiment}/runs.parquet",

@@ -3,7 +3,7 @@
 import pandas as pd
 from job import logged
 
-from reacher_shaping.analysis import comparisons, single_seed_studies
+from reacher_shaping.analysis import comparisons, scores, single_seed_studies
 from reacher_shaping.random_streams import generator
 from reacher_shaping.report import paper_tables
 from reacher_shaping.storage import schemas
@@ -18,6 +18,8 @@ with logged(snakemake.log[0]):
     write_table(output.comparisons, compared, schemas.COMPARISONS)
     write_table(output.variance, comparisons.variance_frame(runs), schemas.VARIANCE)
     write_table(output.power, comparisons.power_frame(runs, published), schemas.POWER)
+    write_table(output.scores, scores.scores_frame(runs), schemas.SCORES)
+    write_table(output.profiles, scores.profiles_frame(runs), schemas.PROFILES)
     random = generator(params.root_seed, "lottery")
     studies = single_seed_studies.single_seed_studies(runs[runs["protocol"] == params.protocol], random)
     write_table(output.lottery, single_seed_studies.lottery_frame(studies), schemas.LOTTERY)

@@ -43,3 +43,26 @@ def agreement(compared: pd.DataFrame) -> str:
         return f"The runs agree: none of {cells} cells differs beyond seed noise (Welch, Holm-corrected, 5 %)."
     names = ", ".join("/".join(str(part) for part in key) for key, _ in apart.groupby(KEY))
     return f"The runs differ beyond seed noise in {len(apart.groupby(KEY))} of {cells} cells: {names}."
+
+
+def compare_verdicts(claims: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
+    """Set the verdicts of two studies side by side: id, ours, reference, same, replication.
+
+    The verdicts are those of the intervals, `replication` the reference's chance that another study comes to its own.
+    Claims that either could not test are left out.
+    """
+    both = claims.merge(reference, on="id", suffixes=("", "_reference"))
+    frame = both[["id", "interval_verdict", "interval_verdict_reference", "replication_reference"]]
+    frame = frame.set_axis(["id", "ours", "reference", "replication"], axis=1)
+    frame = frame[(frame[["ours", "reference"]] != "untestable").all(axis=1)]
+    return frame.assign(same=frame["ours"] == frame["reference"]).reset_index(drop=True)
+
+
+def verdicts_agree(compared: pd.DataFrame) -> str:
+    """Say in one line how many verdicts came out again, and how many were to be expected to."""
+    if compared.empty:
+        return "No claim is tested in both."
+    apart = compared.loc[~compared["same"], "id"].to_list()
+    expected = compared["replication"].sum()
+    text = f"Of {len(compared)} verdicts {compared['same'].sum()} are the same, {expected:.1f} were to be expected."
+    return f"{text} Others: {', '.join(apart)}." if apart else text

@@ -240,6 +240,18 @@ class Study:
     untrained: float | None = None
 
 
+def with_twins(runs: pd.DataFrame, twins: Mapping[str, Mapping[str, str]]) -> pd.DataFrame:
+    """The runs, and again under its other name each variant that its protocol trains as another one.
+
+    `twins`: by protocol, variant -> the variant that has the same training there; one that was trained itself stays.
+    """
+    parts = [runs]
+    for protocol, names in twins.items():
+        own = runs[(runs["protocol"] == protocol) & runs["variant"].isin(names)]
+        parts.append(own.assign(variant=own["variant"].map(names)))
+    return pd.concat(parts, ignore_index=True).drop_duplicates([*CELL, "seed"], ignore_index=True)
+
+
 def derive(runs: pd.DataFrame) -> pd.DataFrame:
     """Add the per-run quantities that claims average; a diverged run's stay missing.
 

@@ -156,7 +156,15 @@ def again(verdict: str, chances: r.Chances) -> float:
     return {REPRODUCED: chances.holds, NOT_REPRODUCED: chances.refuted, INCONCLUSIVE: unclear}.get(verdict, np.nan)
 
 
-def claims_frame(ledger: Sequence[Entry], parts: Sequence[Part]) -> pd.DataFrame:
+def interval_verdicts(parts: Sequence[Part]) -> dict[str, str]:
+    """What the intervals say of each claim by its newest test."""
+    current = [part for part in parts if part.current]
+    return {claim: _interval_verdict([p for p in current if p.claim == claim]) for claim in {p.claim for p in current}}
+
+
+def claims_frame(
+    ledger: Sequence[Entry], parts: Sequence[Part], second: Mapping[str, str] | None = None
+) -> pd.DataFrame:
     """`claims.csv`: id, claim, published, measured, ci_low, ci_high, test, verdict, and what the verdict is worth.
 
     The numbers are those of the claim's first estimate; the verdicts are over all of them. Further columns:
@@ -171,13 +179,15 @@ def claims_frame(ledger: Sequence[Entry], parts: Sequence[Part]) -> pd.DataFrame
     | power, refuted_if_true | chance to come out reproduced, or refuted, were the published tables exactly true |
     | published_holds | whether the published numbers themselves meet the rules; missing where there are none |
     | first_dated, first_verdict | the test fixed before any run, and what the intervals say by it |
+    | second_verdict | `interval_verdict` of the second whole study (`second`, by claim); missing where there is none |
     """
     rows = []
     for entry in ledger:
         own = [part for part in parts if part.claim == entry["id"]]
         current = [part for part in own if part.current]
         first = [part for part in own if part.dated == str(entry["tests"][0]["dated"])]
-        rows.append(_claim(entry, current) | {"first_dated": first[0].dated, "first_verdict": _interval_verdict(first)})
+        row = _claim(entry, current) | {"first_dated": first[0].dated, "first_verdict": _interval_verdict(first)}
+        rows.append(row | {"second_verdict": (second or {}).get(entry["id"])})
     return pd.DataFrame(rows)
 
 

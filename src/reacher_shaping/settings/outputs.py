@@ -11,9 +11,18 @@ DOSES = 3
 """Weights of one variant from which on its effect is shown against the weight."""
 
 
-def table_files(*, switches: bool, peers: bool, hypotheses: bool = False, lengths: bool = False) -> list[str]:
+def judged(keys: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether the paper's claims are judged on a study of these cells: no two protocols have the same one."""
+    cells = [(cell["variant"], cell["budget"], cell["alpha0"]) for cell in keys]
+    return len(set(cells)) == len(cells)
+
+
+def table_files(
+    *, switches: bool, peers: bool, claims: bool = False, hypotheses: bool = False, lengths: bool = False
+) -> list[str]:
     """Return the files of a study's tables: those of all, and those of a study that has what is named."""
     has = {"effects": switches, "agreement": peers, "hypotheses": hypotheses, "lengths": lengths}
+    has |= {"claims": claims, "claim_parts": claims}
     return [entry.file for name, entry in EXPERIMENT_TABLES.items() if has.get(name, True)]
 
 

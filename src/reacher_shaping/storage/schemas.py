@@ -20,8 +20,9 @@ _WORTH = {"dated": TEXT, "replication": NUMBER, "interval_verdict": TEXT, "seeds
 _WORTH |= {"family_verdict": TEXT, "power": NUMBER, "refuted_if_true": NUMBER, "published_holds": NUMBER}
 CLAIMS = Table(
     {"id": TEXT, "claim": TEXT, "published": NUMBER, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER}
-    | {"test": TEXT, "verdict": TEXT, **_WORTH, "first_dated": TEXT, "first_verdict": TEXT},
-    optional=frozenset(_NUMBERS | {"seeds_to_decide", "published_holds"}),
+    | {"test": TEXT, "verdict": TEXT, **_WORTH, "first_dated": TEXT, "first_verdict": TEXT}
+    | {"second_verdict": TEXT},
+    optional=frozenset(_NUMBERS | {"seeds_to_decide", "published_holds", "second_verdict"}),
 )
 CLAIM_PARTS = Table(
     {"id": TEXT, "part": TEXT, "published": NUMBER, "measured": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER}
@@ -60,3 +61,7 @@ POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)
 LOTTERY = Table({"statement": TEXT}, measures=True)
 WINNERS = Table({"variant": TEXT, "budget": INTEGER, "alpha0": NUMBER, "share": NUMBER})
 SPREAD = Table({"quantity": TEXT}, measures=True)
+SCORES = Table({**_CELL, "metric": TEXT, "seeds": INTEGER}, measures=True)
+PROFILES = Table(
+    {"protocol": TEXT, "group": TEXT, "budget": INTEGER, "threshold": NUMBER, "seeds": INTEGER}, measures=True
+)

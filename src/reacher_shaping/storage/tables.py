@@ -160,6 +160,10 @@ STUDY_TABLES = {
     "spread": Entry(
         "spread.csv", schemas.SPREAD, "a quantity that a study of one seed a cell reports", "compare_runs", REPORT
     ),
+    "scores": Entry("scores.parquet", schemas.SCORES, "a cell and a measure: robust averages", "compare_runs"),
+    "profiles": Entry(
+        "profiles.parquet", schemas.PROFILES, "a group of variants, a budget and a success rate", "compare_runs"
+    ),
     "peers": Entry("peers.parquet", schemas.PEERS, "a run of another algorithm", "gather_peers", always=False),
     "trials": Entry("search/trials.csv", schemas.TRIALS, "a trial of the search", "search", always=False),
 }
@@ -202,6 +206,10 @@ EXPERIMENT_TABLES = {
         "evaluate_experiment_controllers",
         ("plot_experiment", *REPORT),
     ),
+    "claims": Entry("claims.csv", schemas.CLAIMS, "a claim of the paper", "judge_experiment", REPORT, always=False),
+    "claim_parts": Entry(
+        "claim_parts.csv", schemas.CLAIM_PARTS, "an estimate behind a claim", "judge_experiment", REPORT, always=False
+    ),
     "effects": Entry(
         "effects.csv",
         schemas.EFFECTS,
@@ -231,7 +239,7 @@ EXPERIMENT_TABLES = {
     ),
 }
 """Tables of a further study, in `results/experiments/{study}/`; `effects` needs switches, `agreement` peers,
-`hypotheses` a ledger, and `lengths` to be asked for."""
+`hypotheses` a ledger, and `lengths` to be asked for; claims are judged where no two protocols have the same cell."""
 
 
 def made_by(rule: str, tables: Mapping[str, Entry], folder: str) -> dict[str, str]:
