@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import yaml
 
 from reacher_shaping.report import paper_tables
 
@@ -146,9 +147,25 @@ def claims():
     return frame.assign(first_dated="2026-11-22", first_verdict=frame["verdict"])
 
 
+def ledger():
+    """The ledger of the claims, as it stands."""
+    return yaml.safe_load((PUBLISHED.parent / "claims.yaml").read_text(encoding="utf-8"))
+
+
+def claim_parts():
+    """An estimate for each rule of the newest tests, as `claim_parts.csv` has them."""
+    rows = []
+    for claim in ledger():
+        for number, name in enumerate(claim["tests"][-1]["rules"]):
+            row = {"id": claim["id"], "part": name, "published": 0.05, "measured": 0.01 * number - 0.02}
+            row |= {"ci_low": row["measured"] - 0.03, "ci_high": row["measured"] + 0.03, "seeds": 10, "rule": "above 0"}
+            rows.append(row | {"verdict": "inconclusive", "dated": "2026-11-25", "current": True})
+    return pd.DataFrame(rows)
+
+
 def controllers():
     """Policies that need no learning."""
-    names = ("zero action", "uniform random", "unit Gaussian", "inverse kinematics + PD")
+    names = ("zero action", "uniform random", "untrained network", "inverse kinematics + PD")
     return pd.DataFrame(
         {"controller": names, "success_rate": (0.002, 0.17, 0.2, 1.0), "mean_return": (-11.8, -42.8, -109.0, -3.7)}
     )

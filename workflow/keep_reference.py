@@ -10,15 +10,12 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
-from reacher_shaping.report import paper_tables
-from reacher_shaping.report.readme import headline, put_headline, sections
+from reacher_shaping.report.loader import load
+from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.outputs import judged, table_files
 from reacher_shaping.settings.study import block_name, load_study, read_settings, settings_hash
-from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import ArtifactError, read_json, read_table, write_json, write_text
+from reacher_shaping.storage.files import ArtifactError, read_json, write_json, write_text
 from reacher_shaping.storage.reference import keep_experiments, keep_tables, manifest, published_bits
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
@@ -56,11 +53,7 @@ def main() -> None:
     write_json(KEPT / "bits.json", bits)
     shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
 
-    cells = read_table(KEPT / "cells.parquet", schemas.CELLS)
-    claims = read_table(KEPT / "claims.csv", schemas.CLAIMS)
-    published = paper_tables.published_cells(*(pd.read_csv(f"report/published/table{number}.csv") for number in (2, 3)))
-    logs = pd.read_csv("report/published/training_logs.csv")
-    text = headline(cells, claims, published, record, f"{KEPT}/{FIGURE}", sections(KEPT, logs))
+    text = headline(load(KEPT, "report/published"), record, f"{KEPT}/{FIGURE}")
     write_text(README, put_headline(README.read_text(encoding="utf-8"), text))
     print(f"The reference run: {KEPT} and README.md")
 

@@ -9,6 +9,7 @@ import pandas as pd
 CELL = ["variant", "budget", "alpha0"]
 KEY = ["protocol", *CELL]
 """Columns that name a cell: within its protocol, and in the whole study."""
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 Setting = tuple[int, float]  # budget in environment steps, alpha0
 
 
@@ -55,8 +56,12 @@ def setting_label(budget: int, alpha0: float) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """A number with a real minus sign and a fixed count of decimals; from a million on with an exponent."""
-    text = f"{value:.{digits}f}" if abs(value) < 1e6 else f"{value:.1e}".replace("e+0", "e").replace("e+", "e")
+    """A number with a real minus sign and a fixed count of decimals; from a million on as a power of ten."""
+    if abs(value) >= 1e6:
+        mantissa, _, power = f"{value:.1e}".partition("e+")
+        text = f"{mantissa} \N{MULTIPLICATION SIGN} 10{str(int(power)).translate(_SUPERSCRIPTS)}" if power else mantissa
+    else:
+        text = f"{value:.{digits}f}"
     return text.replace("-", "\N{MINUS SIGN}")
 
 

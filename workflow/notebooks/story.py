@@ -31,20 +31,19 @@ from IPython.display import SVG, Markdown
 
 from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import to_bytes
-from reacher_shaping.report import captions, paper_tables
+from reacher_shaping.report import captions, claims_view, paper_tables
 from reacher_shaping.report.loader import load
-from reacher_shaping.report.summary import claims_markdown, summary, to_markdown
+from reacher_shaping.report.summary import summary, to_markdown
 from reacher_shaping.report.text import say
 
 study = load(results, published)
 cells, runs, curves = (study.tables[name] for name in ("cells", "runs", "curves"))
-claims = study.tables.get("claims")
 
 # %% [markdown]
 # ## In short
 
 # %%
-Markdown(to_markdown(summary(cells, claims, protocol)))
+Markdown(to_markdown(summary(study, protocol)))
 
 # %% [markdown]
 # ## What was run
@@ -106,4 +105,5 @@ Markdown(paper_tables.to_markdown(table, captions.caption("table_2", cells, runs
 # ## Which claims stand
 
 # %%
-Markdown(say("summary.untested_notebook") if claims is None else claims_markdown(claims))
+judged = claims_view.claims(study.ledger, study.tables)
+Markdown(claims_view.to_markdown(judged) if judged else say("page.claims_none"))

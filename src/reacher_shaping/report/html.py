@@ -1,21 +1,34 @@
 """The report: one HTML file that needs no network and in which every number comes from a table or a setting."""
 
 import base64
-import os
+import csv
+import io
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import jinja2
-import numpy as np
 import pandas as pd
+from markupsafe import Markup
 
 from reacher_shaping.analysis.baselines import ALGORITHMS, by_algorithm, peer_table
-from reacher_shaping.labels import budget_label, cell_order, of_protocol, setting_label, variant_label
-from reacher_shaping.report import captions, paper_tables, seed_uncertainty, study_sections
-from reacher_shaping.report.summary import effect, short_number, summary
-from reacher_shaping.report.text import say
+from reacher_shaping.labels import budget_label, of_protocol
+from reacher_shaping.report import (
+    captions,
+    claims_view,
+    computation,
+    paper_tables,
+    pictures,
+    seed_uncertainty,
+    small_pictures,
+    study_sections,
+)
+from reacher_shaping.report.loader import Study
+from reacher_shaping.report.markup import to_html
+from reacher_shaping.report.summary import VERDICTS, summary
+from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import (
     Grid,
     controllers_grid,
@@ -24,64 +37,31 @@ from reacher_shaping.report.text_tables import (
     settings_grid,
     study_grid,
 )
-from reacher_shaping.settings.base import plain
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
-MEDIA_TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
-MEDIA_BUDGET = 11_000_000  # bytes of videos put into the file; the rest are links
-MANIFEST_NUMBERS = ("env_steps", "wall_seconds", "cpu_seconds", "env_steps_per_second")
+SORTABLE = Path(__file__).parent / "vendor" / "sortable.js"
 OWN_SECTION = ("lottery", "peers")  # figures that stand in a section of their own; other further ones come together
-VERDICT_MARKS = {"reproduced": "✓", "not reproduced": "✗", "inconclusive": "?", "untestable": "\N{EN DASH}"}
+NOTEBOOKS = "notebooks"
+RELEASED = "released"  # the study that computes as the released code does
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a report is made of; what is None or empty is left out, and the report says so.
+    """What a report is made of; what is not there is left out, and the report says so.
 
-    `study` holds the resolved settings; `published` comes from `paper_tables.published_cells`; `controllers` has
-    `controller, success_rate, final_success_rate, mean_return, final_distance`; `figures` maps names such as
-    `figure_1` to SVG files, in the order to show; `power`, `variance`, `winners` and `spread` are the study's tables of
-    these names, `peers` that of the other algorithms, `experiments` those of each further study, `training_logs` the
-    published logs' summaries, `every_published` is `published` with the run that the tables leave out; `ledger` has the
-    claims' `id, evidence, shown_in`; relative links start at `folder`.
+    `settings` holds the resolved settings; `study` the tables; `figures` maps names such as `figure_1` to SVG files, in
+    the order to show; `manifests` are those of the study's blocks.
     """
 
-    study: Mapping[str, Any]
-    cells: pd.DataFrame
-    runs: pd.DataFrame
-    published: pd.DataFrame
-    correlation: pd.DataFrame | None = None
-    claims: pd.DataFrame | None = None
-    controllers: pd.DataFrame | None = None
-    power: pd.DataFrame | None = None
-    variance: pd.DataFrame | None = None
-    winners: pd.DataFrame | None = None
-    spread: pd.DataFrame | None = None
-    peers: pd.DataFrame | None = None
-    experiments: Mapping[str, Mapping[str, pd.DataFrame]] = field(default_factory=dict)
-    training_logs: pd.DataFrame = field(default_factory=pd.DataFrame)
-    every_published: pd.DataFrame | None = None
-    figures: Mapping[str, Path] = field(default_factory=dict)
+    settings: Mapping[str, Any]
+    study: Study
+    figures: Mapping[str, Path]
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
     notebooks: Sequence[Path] = ()
-    ledger: Sequence[Mapping[str, Any]] = ()
     settings_hash: str = ""
     protocol: str | None = None
-    folder: Path = Path("report")
     template: Path = TEMPLATE
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure or video: name, title, caption, content as a data URI or a relative link, and links to other files."""
-
-    name: str
-    title: str
-    caption: str
-    source: str
-    links: Mapping[str, str]
-    kind: str = "image"
 
 
 def build(inputs: Inputs) -> str:
@@ -89,177 +69,153 @@ def build(inputs: Inputs) -> str:
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["markup"] = to_html
+    environment.globals |= {"text": say, "sort_key": sort_key, "csv": csv_uri}
     template = environment.from_string(inputs.template.read_text(encoding="utf-8"))
     return template.render(contents(inputs))
 
 
 def contents(inputs: Inputs) -> dict[str, Any]:
     """Everything the template may name."""
-    cells = of_protocol(inputs.cells, inputs.protocol)
-    pictures = {name: _figure(name, path, inputs) for name, path in inputs.figures.items()}
-    own = ("figure_", *(f"{name}_" for name in inputs.experiments))
+    study = inputs.study
+    cells = of_protocol(study.tables["cells"], inputs.protocol)
+    protocol = inputs.protocol or (str(cells["protocol"].iloc[0]) if len(cells) else "")
+    drawn = {name: _figure(name, path, inputs) for name, path in inputs.figures.items()}
+    own = ("figure_", *(f"{name}_" for name in study.experiments))
+    tables, videos = _tables(cells, inputs), pictures.videos(inputs.media, cells)
+    further = [picture for name, picture in drawn.items() if not name.startswith(own) and name not in OWN_SECTION]
+    facts = computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol)
+    first = summary(study, inputs.protocol)
+    absent = {"further": not further, "rollouts": not videos}
+    sections = [name for name in entry("page.sections") if not absent.get(name, False)]
     return {
-        "summary": summary(cells, inputs.claims),
-        "study": inputs.study,
-        "settings": settings_grid(inputs.study, set(cells["protocol"])),
+        "summary": first,
+        "first_picture": small_pictures.bars(first.bars, say("first.picture")) if first.bars else "",
+        "facts": facts,
+        "print_facts": re.sub(r"[\"\\\n]", "", " · ".join(facts)),
+        "toy": computation.toy(cells),
+        "sections": sections,
+        "anchors": {*sections, *drawn, *tables, *study.experiments},
+        "claims": claims_view.claims(
+            study.ledger, study.tables, study.experiments.get(RELEASED), study.tables.get("sensitivity")
+        ),
+        "verdicts": VERDICTS,
+        "words": {word: meaning.format(radius=_radius(inputs)) for word, meaning in entry("page.words").items()},
+        "study": inputs.settings,
+        "evaluation": say(
+            "page.evaluation", episodes=f"{inputs.settings['evaluation']['episodes']:,}", radius=_radius(inputs)
+        ),
+        "settings": settings_grid(inputs.settings, set(cells["protocol"])),
+        "departures": departures_grid(inputs.settings),
         "grid": study_grid(cells),
-        "cell_count": len(cells),
-        "run_count": int(cells["seeds"].sum()) if len(cells) else 0,
-        "diverged": int(cells["diverged"].sum()) if len(cells) else 0,
-        "pictures": pictures,
-        "further": [
-            picture for name, picture in pictures.items() if not name.startswith(own) and name not in OWN_SECTION
-        ],
+        "pictures": drawn,
+        "further": further,
         "experiments": [
-            study_sections.section(name, given, inputs.training_logs, inputs.correlation, inputs.every_published)
-            for name, given in inputs.experiments.items()
+            study_sections.section(
+                name,
+                tables,
+                study.training_logs,
+                study.tables.get("correlation"),
+                study.every_published,
+                headed(inputs.settings, name),
+            )
+            for name, tables in study.experiments.items()
         ],
-        "departures": departures_grid(inputs.study),
-        "tables": _tables(cells, inputs),
+        "tables": tables,
         "sentences": _sentences(inputs),
-        "controllers": controllers_grid(inputs.controllers, inputs.protocol),
-        "claims": _claims(inputs),
-        "videos": videos(inputs, cells),
-        "notebooks": {path.stem.replace("_", " "): _link(path, inputs) for path in inputs.notebooks},
-        "computation": computation(inputs),
+        "controllers": controllers_grid(study.tables.get("controllers"), inputs.protocol),
+        "videos": videos,
+        "notebooks": ", ".join(f"[{_words(path.stem)}]({NOTEBOOKS}/{path.name})" for path in inputs.notebooks),
+        "computation": computation.grid(inputs.manifests),
         "settings_hash": inputs.settings_hash,
-        "protocol": inputs.protocol or (str(cells["protocol"].iloc[0]) if len(cells) else ""),
+        "limits": entry("page.limits"),
+        "references": entry("page.references"),
+        "sortable": Markup(SORTABLE.read_text(encoding="utf-8")),
+        "script_words": {name: say(f"page.{name}") for name in ("filter", "enlarge", "shrink")},
     }
+
+
+def headed(settings: Mapping[str, Any], study: str) -> dict[str, str]:
+    """Title and question of a further study, as far as its settings have them."""
+    own = settings.get("experiments", {}).get(study, {})
+    return {name: own[name] for name in ("title", "question") if own.get(name)}
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _radius(inputs: Inputs) -> str:
+    return f"{1000 * inputs.settings['evaluation']['radius']:g}"
+
+
+def sort_key(text: str) -> str:
+    """What a column of numbers is sorted by: the first number of an entry; nothing where there is none."""
+    found = re.match(r"[<>]?\s*(\N{MINUS SIGN}?[\d.,]+(?:e\d+)?)", text)
+    return found[1].replace("\N{MINUS SIGN}", "-").replace(",", "") if found else ""
+
+
+def csv_uri(grid: Grid) -> str:
+    """A table's rows as a CSV file within the page."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerows([grid.headings, *grid.rows])
+    content = grid.csv or buffer.getvalue()
+    return f"data:text/csv;charset=utf-8;base64,{base64.b64encode(content.encode()).decode()}"
 
 
 def _tables(cells: pd.DataFrame, inputs: Inputs) -> dict[str, dict[str, Any]]:
-    """The tables with titles and captions: the paper's three, our measures, and those whose tables were given."""
-    protocol = inputs.protocol
+    """The tables with titles and captions: the paper's three, our measures, and those whose tables are there."""
+    tables, published, protocol = inputs.study.tables, inputs.study.published, inputs.protocol
+    runs = of_protocol(tables["runs"], protocol)
     grids = {
-        name: of_table(make(cells, inputs.published))
-        for name, make in (
-            ("table_1", paper_tables.table_1),
-            ("table_2", paper_tables.table_2),
-            ("table_3", paper_tables.table_3),
-        )
+        "table_1": of_table(paper_tables.table_1(cells, published)),
+        "table_2": of_table(paper_tables.table_2(cells, published)),
+        "table_3": of_table(paper_tables.table_3(cells, published)),
+        "behaviour": of_table(paper_tables.behaviour(cells)),
+        "learning": of_table(paper_tables.learning(cells, runs)),
+        "robust": of_table(paper_tables.robust(cells, tables.get("comparisons"))),
     }
-    grids["behaviour"] = of_table(paper_tables.behaviour(cells))
-    grids["learning"] = of_table(paper_tables.learning(cells, of_protocol(inputs.runs, protocol)))
-    if inputs.power is not None:
-        grids["power"] = seed_uncertainty.power_grid(inputs.power, protocol)
-    if inputs.variance is not None:
-        grids["variance"] = seed_uncertainty.variance_grid(inputs.variance, protocol)
-    if inputs.winners is not None:
-        grids["winners"] = seed_uncertainty.winners_grid(inputs.winners)
-    if inputs.spread is not None:
-        grids["spread"] = seed_uncertainty.spread_grid(inputs.spread, inputs.published)
-    if inputs.peers is not None:
-        grids["peer_table"] = of_table(peer_table(inputs.peers, cells, inputs.controllers, protocol))
+    if "power" in tables:
+        grids["power"] = seed_uncertainty.power_grid(tables["power"], protocol)
+    if "variance" in tables:
+        grids["variance"] = seed_uncertainty.variance_grid(tables["variance"], protocol)
+    if "winners" in tables:
+        grids["winners"] = seed_uncertainty.winners_grid(tables["winners"])
+    if "spread" in tables:
+        grids["spread"] = seed_uncertainty.spread_grid(tables["spread"], published)
+    if "peers" in tables:
+        grids["peer_table"] = of_table(peer_table(tables["peers"], cells, tables.get("controllers"), protocol))
     return {
-        name: {"title": captions.title(name), "caption": captions.caption(name, cells, inputs.runs), "grid": grid}
+        name: {"title": captions.title(name), "caption": captions.caption(name, cells, runs), "grid": grid}
         for name, grid in grids.items()
     }
 
 
 def _sentences(inputs: Inputs) -> dict[str, str]:
-    """What the tables that were given say, in a sentence each."""
-    said = {}
-    if inputs.power is not None:
-        said["power"] = seed_uncertainty.power_sentence(inputs.power, inputs.protocol)
-    if inputs.variance is not None:
-        said["variance"] = seed_uncertainty.variance_sentence(inputs.variance, inputs.protocol)
-    if inputs.winners is not None:
-        said["winners"] = seed_uncertainty.winners_sentence(inputs.winners)
-    if inputs.peers is not None:
-        said["peers"] = budgets_sentence(inputs.peers)
+    """What the tables that are there say, in a sentence each."""
+    tables, said = inputs.study.tables, {}
+    if "power" in tables:
+        said["power"] = seed_uncertainty.power_sentence(tables["power"], inputs.protocol)
+    if "variance" in tables:
+        said["variance"] = seed_uncertainty.variance_sentence(tables["variance"], inputs.protocol)
+    if "winners" in tables:
+        said["winners"] = seed_uncertainty.winners_sentence(tables["winners"])
+    if "peers" in tables:
+        said["peers"] = budgets_sentence(tables["peers"])
     return said
 
 
-def _claims(inputs: Inputs) -> list[dict[Any, Any]]:
-    """Every claim with verdict, effect, evidence and the figures behind it."""
-    if inputs.claims is None:
-        return []
-    ledger = {entry["id"]: entry for entry in inputs.ledger}
-    rows: list[dict[Any, Any]] = []
-    for row in inputs.claims.to_dict("records"):
-        entry = ledger.get(row["id"], {})
-        shown_in = [(name, captions.title(name).split(".")[0]) for name in entry.get("shown_in", [])]
-        published = row["published"]
-        text = short_number(published) if isinstance(published, float) else str(published)
-        more = {"effect": effect(row), "mark": VERDICT_MARKS.get(row["verdict"], ""), "published": text}
-        rows.append(row | more | {"evidence": entry.get("evidence", ""), "shown_in": shown_in})
-    return rows
-
-
-def videos(inputs: Inputs, cells: pd.DataFrame) -> list[Picture]:
-    """One video per cell, MP4 where there is one, embedded while the size budget lasts."""
-    chosen = {path.stem: path for path in sorted(inputs.media, key=lambda path: path.suffix != ".gif")}
-    shown, left = [], MEDIA_BUDGET
-    for row in sorted(cells.to_dict("records"), key=cell_order):
-        stem = f"{row['protocol']}-{row['variant']}-{row['budget']}-alpha{plain(row['alpha0'])}"
-        path = chosen.pop(stem, None)
-        if path is None:
-            continue
-        size = path.stat().st_size
-        source = data_uri(path) if size <= left else _link(path, inputs)
-        left -= size if size <= left else 0
-        title = f"{variant_label(str(row['variant']))}, {setting_label(int(row['budget']), row['alpha0'])}"
-        caption = say("computation.video", rate=f"{100 * row['success_rate']:.1f}\N{NO-BREAK SPACE}%")
-        kind = "video" if path.suffix == ".mp4" else "image"
-        shown.append(Picture(stem, title, caption, source, {path.suffix[1:].upper(): _link(path, inputs)}, kind))
-    return shown
-
-
-def _figure(name: str, path: Path, inputs: Inputs) -> Picture:
-    caption = captions.caption(name, inputs.cells, inputs.runs, inputs.protocol)
-    others = [path.with_suffix(suffix) for suffix in (".svg", ".pdf") if path.with_suffix(suffix).exists()]
-    links = {other.suffix[1:].upper(): _link(other, inputs) for other in others}
-    return Picture(name, captions.title(name), caption, data_uri(path), links)
-
-
-def _link(path: Path, inputs: Inputs) -> str:
-    return Path(os.path.relpath(path, inputs.folder)).as_posix()
-
-
-def data_uri(path: Path) -> str:
-    """A file's content as a URI, so that the page needs no other file."""
-    return f"data:{MEDIA_TYPES[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode()}"
-
-
-def computation(inputs: Inputs) -> Grid | None:
-    """How the study was computed, from the manifests of its blocks."""
-    if not inputs.manifests:
-        return None
-    several = {
-        "code": [_commit(manifest.get("git", {})) for manifest in inputs.manifests],
-        "machine": [_machine(manifest.get("machine", {})) for manifest in inputs.manifests],
-        "threads": [str(manifest.get("threads", "")) for manifest in inputs.manifests],
-    }
-    frame = pd.DataFrame([{name: row.get(name, np.nan) for name in MANIFEST_NUMBERS} for row in inputs.manifests])
-    total = frame.sum()
-    speed = frame["env_steps_per_second"].quantile([0.0, 0.5, 1.0]).tolist()
-    rows = [[say(f"computation.{name}"), "; ".join(dict.fromkeys(values))] for name, values in several.items()]
-    rows += [
-        [say("computation.jobs"), f"{len(frame):,}"],
-        [say("computation.steps"), f"{total['env_steps']:,.0f}"],
-        [
-            say("computation.time"),
-            say("computation.hours", wall=total["wall_seconds"] / 3600, cpu=total["cpu_seconds"] / 3600),
-        ],
-        [say("computation.speed"), say("computation.speeds", least=speed[0], median=speed[1], most=speed[2])],
-    ]
-    packages: dict[str, dict[str, None]] = {}
-    for manifest in inputs.manifests:
-        for name, version in manifest.get("versions", {}).items():
-            packages.setdefault(name, {})[str(version)] = None
-    rows.append(
-        [say("computation.versions"), ", ".join(f"{name} {' / '.join(found)}" for name, found in packages.items())]
-    )
-    return Grid(["", ""], rows, frozenset({0, 1}))
-
-
-def _commit(git: Mapping[str, Any]) -> str:
-    commit = str(git.get("commit") or say("computation.no_commit"))[:12]
-    return say("computation.dirty", commit=commit) if git.get("dirty") else commit
-
-
-def _machine(machine: Mapping[str, Any]) -> str:
-    return ", ".join(str(machine[name]) + (" cores" if name == "cores" else "") for name in machine)
+def _figure(name: str, path: Path, inputs: Inputs) -> pictures.Picture:
+    study = inputs.study
+    title = captions.title(name)
+    experiment, _, view = name.rpartition("_")
+    if experiment in study.experiments:
+        caption = study_sections.caption(view, study.experiments[experiment], study.training_logs)
+    else:
+        caption = captions.caption(name, study.tables["cells"], study.tables["runs"], inputs.protocol)
+    alternative = f"{title}. {caption.split('. ')[0].rstrip('.')}."
+    return pictures.Picture(name, title, caption, alternative, pictures.data_uri(path))
 
 
 def budgets_sentence(peers: pd.DataFrame) -> str:

@@ -6,7 +6,16 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping.labels import CELL, budget_label, cell_order, in_groups, number, of_protocol, variant_label
+from reacher_shaping.labels import (
+    CELL,
+    budget_label,
+    cell_order,
+    in_groups,
+    number,
+    of_protocol,
+    setting_label,
+    variant_label,
+)
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.storage.files import write_text
 
@@ -26,6 +35,7 @@ LEARNING = ("steps_to_threshold", "area_under_curve", "drop_from_peak", "roughne
 HEADINGS: Mapping[str, str] = entry("headings")
 # Decimals and factor where they differ from 3 and 1.
 FORMATS = {
+    "improvement": (0, 100.0),
     "final_distance": (1, 1000.0),
     "first_hit_step": (1, 1.0),
     "reward_distance": (2, 1.0),
@@ -105,6 +115,20 @@ def learning(cells: pd.DataFrame, runs: pd.DataFrame, protocol: str | None = Non
     return table
 
 
+def robust(cells: pd.DataFrame, comparisons: pd.DataFrame | None, protocol: str | None = None) -> pd.DataFrame:
+    """Measures that single runs cannot move: as `behaviour`, with the interquartile means of success and return, and
+    where there are comparisons the probability of improvement in success over none of the same budget.
+    """
+    ours = of_protocol(cells, protocol)
+    table = _measured(ours, ("success_rate",)).merge(ours[[*CELL, "success_rate_iqm", "mean_return_iqm"]], on=CELL)
+    if comparisons is None:
+        return table
+    rows = of_protocol(comparisons, protocol)
+    rows = rows[(rows["family"] == "none") & (rows["metric"] == "success_rate")]
+    chances = [name for name in rows if str(name).startswith("improvement")]
+    return table.merge(rows[[*CELL, *chances]], on=CELL, how="left")
+
+
 def _measured(cells: pd.DataFrame, measures: tuple[str, ...]) -> pd.DataFrame:
     columns = [f"{name}{end}" for name in measures if name in cells for end in ("", "_low", "_high")]
     table = cells[[*CELL, "seeds", "diverged", *columns]]
@@ -115,23 +139,32 @@ def _measured(cells: pd.DataFrame, measures: tuple[str, ...]) -> pd.DataFrame:
 def readable(table: pd.DataFrame) -> pd.DataFrame:
     """The table as people read it: every entry a string, headings with units, intervals in brackets."""
     columns: list[tuple[str, pd.Series]] = []
+    cells = set(CELL) <= set(table)
     for name, heading in HEADINGS.items():
-        if name in table:
+        if cells if name == "setting" else name in table and not (cells and name in CELL):
             texts = [_entry(name, row) for row in table.to_dict("records")]
             columns.append((heading, pd.Series(texts, dtype=str)))
-    frame = pd.concat([series for _, series in columns], axis=1)
+    frame = pd.concat([series for _, series in columns], axis="columns")
     frame.columns = pd.Index([heading for heading, _ in columns])
     return frame
 
 
+def cell_label(row: Mapping[Any, Any]) -> str:
+    """A cell as people read it; without shaping there is no weight, unless one stands as a label."""
+    variant, budget, alpha0 = str(row["variant"]), int(row["budget"]), float(row["alpha0"])
+    unweighted = variant == "none" and alpha0 == 1
+    setting = budget_label(budget) if unweighted else setting_label(budget, alpha0)
+    return f"{variant_label(variant)}, {setting}"
+
+
 def _entry(name: str, row: dict[Any, Any]) -> str:
+    if name == "setting":
+        return cell_label(row)
     value = row[name]
     if pd.isna(value):
         return "\N{EN DASH}"
     if name == "policy":
         return str(value)
-    if name == "variant":
-        return variant_label(str(value))
     if name == "budget":
         return budget_label(int(value))
     if name == "seeds":
@@ -140,14 +173,19 @@ def _entry(name: str, row: dict[Any, Any]) -> str:
         return f"{value:.0f} of {row['seeds']:.0f}"
     if name in ("rank", "published_rank"):
         return f"{value:.0f}"
-    if name == "alpha0":
-        return f"{value:g}"
-    digits, factor = FORMATS.get(name, (2 if name.endswith("return") else 3, 1.0))
+    digits, factor = decimals(name)
     text = number(factor * value, digits)
     low, high = row.get(f"{name}_low"), row.get(f"{name}_high")
     if low is None or high is None or pd.isna(low):
         return text
     return f"{text} [{number(factor * low, digits)}, {number(factor * high, digits)}]"
+
+
+def decimals(name: str) -> tuple[int, float]:
+    """Decimals of a measure and the factor it is shown with: shares in per cent, distances in mm."""
+    if "success_rate" in name or name == "share_within_radius":
+        return 1, 100.0
+    return FORMATS.get(name, (2 if "return" in name else 3, 1.0))
 
 
 def seed_count(seeds: float, diverged: float) -> str:
@@ -159,7 +197,7 @@ def to_markdown(frame: pd.DataFrame, caption: str) -> str:
     """A table as `table_2` gives it, formatted for reading, its caption above."""
     shown = readable(frame)
     lines = ["| " + " | ".join(shown.columns) + " |"]
-    text_columns = {HEADINGS["variant"], HEADINGS["policy"]}
+    text_columns = {HEADINGS["setting"], HEADINGS["policy"]}
     lines.append("|" + "|".join(" :-- " if name in text_columns else " --: " for name in shown.columns) + "|")
     lines += ["| " + " | ".join(row) + " |" for row in shown.itertuples(index=False)]
     if shown.empty:

@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 
 from reacher_shaping.analysis import single_seed_studies
-from reacher_shaping.labels import budget_label, cell_order, number, of_protocol, setting_label, variant_label
+from reacher_shaping.labels import cell_order, number, of_protocol
+from reacher_shaping.report import paper_tables
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid
 
 POWER = 0.8  # chance to see an effect that counts as enough, as `power.parquet` has it
 MOST = 10_000  # seeds up to which `stats.seeds_needed` looks
-CELL_HEADINGS = [say(f"headings.{name}") for name in ("variant", "budget", "alpha0")]
+CELL_HEADINGS = [say("headings.setting")]
 
 
 def power_grid(power: pd.DataFrame, protocol: str | None = None) -> Grid:
@@ -24,8 +25,8 @@ def power_grid(power: pd.DataFrame, protocol: str | None = None) -> Grid:
     rows = [
         [
             *_cell(row),
-            _text(row["published_gain"]),
-            _text(row["deviation"]),
+            _text(100 * row["published_gain"], 1),
+            _text(100 * row["deviation"], 1),
             f"{row['seeds']:.0f}",
             _text(row["power"], 2),
             _text(row["power_3"], 2),
@@ -62,8 +63,8 @@ def variance_grid(variance: pd.DataFrame, protocol: str | None = None) -> Grid:
         [
             *_cell(row),
             f"{row['seeds']:.0f}",
-            _text(np.sqrt(row["seed_variance"])),
-            _text(np.sqrt(row["evaluation_variance"])),
+            _text(100 * np.sqrt(row["seed_variance"]), 1),
+            _text(100 * np.sqrt(row["evaluation_variance"]), 1),
             _percent(_share(row)),
         ]
         for row in _sorted(of_protocol(variance, protocol))
@@ -100,7 +101,7 @@ def winners_sentence(winners: pd.DataFrame) -> str:
     if winners.empty:
         return say("seeds.winners_unknown")
     first = winners.sort_values("share", ascending=False).iloc[0]
-    name = f"{variant_label(str(first['variant']))} ({setting_label(int(first['budget']), float(first['alpha0']))})"
+    name = paper_tables.cell_label(first.to_dict())
     return say("seeds.winners", cells=len(winners), name=name, share=_percent(first["share"], 1))
 
 
@@ -131,7 +132,7 @@ def _sorted(frame: pd.DataFrame) -> list[dict[Any, Any]]:
 
 
 def _cell(row: dict[Any, Any]) -> list[str]:
-    return [variant_label(str(row["variant"])), budget_label(int(row["budget"])), f"{row['alpha0']:g}"]
+    return [paper_tables.cell_label(row)]
 
 
 def _text(value: float, digits: int = 3) -> str:

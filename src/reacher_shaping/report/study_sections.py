@@ -22,6 +22,7 @@ from reacher_shaping.report.text_tables import Grid
 from reacher_shaping.settings import outputs
 
 LEVEL = 0.05
+COLLAPSE = 1000  # a difference in return that no policy near its target can make
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,13 @@ def section(
     training_logs: pd.DataFrame,
     main: pd.DataFrame | None = None,
     published: pd.DataFrame | None = None,
+    words: Mapping[str, str] | None = None,
 ) -> Section:
     """What the report says of one experiment.
 
-    `given` are its tables by name (`experiments.SCHEMAS`), `training_logs` the published logs' summaries, `main` the
-    main study's correlations, and `published` all published runs (`paper_tables.published_cells`).
+    `given` are its tables by name (`tables.EXPERIMENT_TABLES`), `words` its title and question, `training_logs` the
+    published logs' summaries, `main` the main study's correlations, and `published` all published runs
+    (`paper_tables.published_cells`).
     """
     said, found = [], {}
     keys = [{str(name): value for name, value in row.items()} for row in given["cells"].to_dict("records")]
@@ -77,9 +80,9 @@ def section(
         family = "row" if only_cell(shaped) else "column"
         found[say(f"study_tables.shaping_{family}")] = study_tables.shaping(corrected(shaped, SHAPING))
     found[say("study_tables.cells")] = study_tables.cells(given["cells"])
-    words = entry("studies").get(name, {"title": protocol_label(name).capitalize(), "intro": ""})
+    words = {"title": protocol_label(name).capitalize(), "question": "", **(words or {})}
     figures = [f"{name}_{view}" for view in shown]
-    return Section(name, words["title"], words["intro"], [text for text in said if text], found, figures)
+    return Section(name, words["title"], words["question"], [text for text in said if text], found, figures)
 
 
 def document(
@@ -100,6 +103,20 @@ def document(
             parts.append(f'<img alt="{figure}" src="data:image/svg+xml;base64,{picture}">')
         parts += [f"{caption}:\n\n{text_tables.to_markdown(grid)}" for caption, grid in own.grids.items()]
     return "\n\n".join(part for part in parts if part)
+
+
+def caption(view: str, tables: Mapping[str, pd.DataFrame], training_logs: pd.DataFrame) -> str:
+    """The caption of a study's figure; of the log only what can be seen there."""
+    texts = [say(f"views.{view}.caption", window=WINDOW)]
+    if view == "log":
+        logged = tables["logged"]
+        keys = ["protocol", "budget"]
+        labelled = set(logged.loc[logged["alpha0"] == 1, keys].itertuples(index=False, name=None))
+        if labelled & set(training_logs[keys].itertuples(index=False, name=None)):
+            texts.append(say("views.log.published"))
+        if logged["episode_return"].min() < 4 * training_logs["final_return"].min():
+            texts.append(say("views.log.collapse"))
+    return " ".join(texts)
 
 
 def within(metric: str) -> str:
@@ -128,12 +145,15 @@ def best_sentence(cells: pd.DataFrame) -> str:
 
 
 def effects_sentence(effects: pd.DataFrame) -> str:
-    """Which switch moves each measure most, and where switches interact beyond chance."""
-    parts = []
+    """Which switch moves each measure most, which let returns collapse, and where switches interact beyond chance."""
+    parts, collapsed = [], []
     for metric in METRICS:
         digits, factor = decimals(metric)
         single = effects[(effects["metric"] == metric) & effects["effect"].isin(["alone", "last"])]
         single = single.dropna(subset="difference")
+        beyond = (single["difference"].abs() >= COLLAPSE) & (metric == "unit_return")
+        collapsed += [protocol_label(str(name)) for name in single.loc[beyond, "switch"]]
+        single = single[~beyond]
         if single.empty:
             continue
         row = single.iloc[int(single["difference"].abs().to_numpy().argmax())].to_dict()
@@ -149,6 +169,9 @@ def effects_sentence(effects: pd.DataFrame) -> str:
             )
         )
     text = say("study_sentences.effects", effects="; ".join(parts)) if parts else ""
+    if collapsed:
+        switches = ", ".join(dict.fromkeys(collapsed))
+        text += f" {say('study_sentences.collapse', limit=f'{COLLAPSE:,}', switches=switches)}"
     found = effects[(effects["effect"] == "interaction") & (effects["p_holm"] < LEVEL)]
     if not (effects["effect"] == "interaction").any():
         return text

@@ -28,10 +28,10 @@ DASH = "\N{EN DASH}"
 
 
 def decimals(metric: str) -> tuple[int, float]:
-    """Decimals of a measure, and the factor it is shown with: distances in mm."""
-    return (
-        (1, 1000.0) if metric.endswith("distance") else (2, 1.0) if metric.endswith(("return", "curve")) else (3, 1.0)
-    )
+    """Decimals of a measure, and the factor it is shown with: shares in per cent, distances in mm."""
+    if metric.endswith("rate"):
+        return 1, 100.0
+    return (1, 1000.0) if metric.endswith("distance") else (2, 1.0)
 
 
 def interval(row: Mapping[Any, Any], name: str, low: str, high: str, digits: int, factor: float = 1.0) -> str:
@@ -206,4 +206,7 @@ def cells(table: pd.DataFrame) -> Grid:
     keep = ["policy", "variant", "budget", "alpha0", "seeds", "diverged"]
     keep += [f"{name}{end}" for name in paper_tables.MEASURED for end in ("", "_low", "_high")]
     grid = of_table(frame[keep])
-    return Grid([say("tables.protocol"), *grid.headings[1:]], grid.rows, grid.texts)
+    places = [1, 0, *range(2, len(grid.headings))]  # the protocol first
+    headings = [grid.headings[place] for place in places]
+    rows_shown = [[row[place] for place in places] for row in grid.rows]
+    return Grid([say("tables.protocol"), *headings[1:]], rows_shown, grid.texts, grid.csv)

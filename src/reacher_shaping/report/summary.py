@@ -1,139 +1,280 @@
-"""The study's answers in plain words, made from the tables of cells and claims. No number stands in a sentence here."""
+"""What the study says first: an answer to each question with its number, three numbers to judge by, and reasons.
 
+Everything is made from the study's tables; no number stands in a sentence here.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from reacher_shaping.labels import budget_label, in_groups, number, of_protocol, setting_label, variant_label
+from reacher_shaping.analysis.comparisons import corrected
+from reacher_shaping.labels import CELL, number, of_protocol, stochastic
+from reacher_shaping.report.loader import Study
+from reacher_shaping.report.quantities import shown, with_interval
+from reacher_shaping.report.small_pictures import Bar
 from reacher_shaping.report.text import entry, say
 
-Row = dict[Any, Any]
+LEVEL = 0.05
+PERCENT = "\N{NO-BREAK SPACE}%"
 VERDICTS = ("reproduced", "not reproduced", "inconclusive", "untestable")
+Row = Mapping[Any, Any]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A question, the short answer to it, and the sentences that bear it out."""
+    """A question, the short answer to it, the sentence with the number, and where the evidence is."""
 
     question: str
     short: str
-    because: list[str]
+    because: str
+    link: str
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What the study says first: a few sentences, then the answers to the guiding questions."""
+    """The first screen: what was done, answers, numbers to judge by, verdict counts, reasons, and a picture's rows."""
 
-    headline: list[str]
+    lead: str
     answers: list[Answer]
+    numbers: list[tuple[str, str]]
+    counts: list[str]
+    why: list[str]
+    bars: list[Bar]
 
 
-def summary(cells: pd.DataFrame, claims: pd.DataFrame | None, protocol: str | None = None) -> Summary:
-    """The headline and the four answers; without claims only what the table of cells shows."""
-    ours = of_protocol(cells, protocol)
-    headline = [_best_and_baseline(ours)] if not ours.empty else [say("summary.nothing")]
-    if claims is None or claims.empty:
-        return Summary([*headline, say("summary.untested")], [])
+def summary(study: Study, protocol: str | None = None) -> Summary:
+    """The first screen of a study; what its tables do not tell is left out."""
+    cells = of_protocol(study.tables["cells"], protocol)
+    if cells.empty:
+        return Summary(say("summary.nothing"), [], [], [], [], [])
+    published = study.published.merge(cells[CELL], on=CELL)
+    counts = sorted(cells["seeds"].unique())
+    runs = say("first.once") if counts[-1] == 1 else say("first.times", count=_span(counts))
+    lead = say("first.lead" if len(published) else "first.lead_unpublished", published=len(published), runs=runs)
     return Summary(
-        [*headline, _verdict_counts(claims)],
-        [_answer(question["ask"], claims[claims["id"].isin(question["claims"])]) for question in entry("questions")],
+        lead,
+        answers(study, protocol),
+        numbers(study, protocol),
+        verdict_counts(study),
+        why(study, protocol),
+        bars(study, protocol),
     )
 
 
-def _best_and_baseline(cells: pd.DataFrame) -> str:
-    """The best cell of the main grid beside the unshaped cells."""
-    main = in_groups(cells, ("none", "constant", "decay"))
-    rows = (cells if main.empty else main).sort_values("success_rate", ascending=False).to_dict("records")
-    plain = sorted((row for row in rows if row["variant"] == "none"), key=lambda row: row["budget"])
-    shaped = [row for row in rows if row["variant"] != "none"]
-    if not shaped:
-        return say("summary.only_plain", rate=_percent(rows[0], "success_rate"))
-    best = shaped[0]
-    text = say("summary.best", cell=_name(best), rate=_percent(best, "success_rate"))
-    if not plain:
-        return say("summary.no_plain", best=text)
-    rates = [
-        say("summary.plain_rate", rate=_percent(row, "success_rate"), budget=budget_label(row["budget"]))
-        for row in plain
-    ]
-    text = say("summary.plain", best=text, rates=" and ".join(rates))
-    same = [row for row in plain if row["budget"] == best["budget"]]
-    if not same:
-        return text
-    apart = same[0]["success_rate_high"] < best["success_rate_low"]
-    return f"{text} {say('summary.apart' if apart else 'summary.overlap', budget=budget_label(best['budget']))}"
+def _span(counts: Sequence[int]) -> str:
+    return f"{counts[0]}" if counts[0] == counts[-1] else say("seeds.span", first=counts[0], last=counts[-1])
 
 
-def _name(row: Row) -> str:
-    return f"{variant_label(str(row['variant']))} ({setting_label(int(row['budget']), row['alpha0'])})"
+def answers(study: Study, protocol: str | None = None) -> list[Answer]:
+    """An answer to each question that the tables can tell."""
+    makers = {"potential": _by_family, "solve": _solved}
+    found = (makers.get(name, _by_claim)(name, study, protocol) for name in entry("questions"))
+    return [answer for answer in found if answer]
 
 
-def _percent(row: Row, name: str) -> str:
-    """A rate in per cent with its interval."""
-    text = f"{100 * row[name]:.1f} %"
-    low, high = row.get(f"{name}_low", np.nan), row.get(f"{name}_high", np.nan)
-    return text if np.isnan(low) else f"{text} [{100 * low:.1f}, {100 * high:.1f}]"
+def _by_claim(name: str, study: Study, protocol: str | None) -> Answer | None:
+    """The answer that a claim's verdict gives."""
+    words = entry(f"questions.{name}")
+    parts = study.tables.get("claim_parts")
+    if parts is None or "claims" not in study.tables:
+        return None
+    claims = study.tables["claims"]
+    judged = claims[claims["id"] == words["claim"]]
+    rows = parts[(parts["id"] == words["claim"]) & (parts["part"] == words["part"])]
+    if judged.empty or rows.empty:
+        return None
+    unit = entry(f"estimates.{words['claim']}")[words["part"]][1]
+    row = rows.iloc[0].to_dict()
+    if not np.isfinite(row["measured"]):
+        return Answer(words["ask"], say("short.untestable"), "", words["link"])
+    apart, cells = apart_from(study.tables.get("comparisons"), "none", protocol)
+    effect = with_interval(row, "points").removesuffix(entry("units")["points"])
+    because = say(f"questions.{name}.reason", effect=effect, apart=apart, cells=cells)
+    if "against" in words and row["published"] < 0:
+        because += f" {say(f'questions.{name}.against', published=shown(row['published'], unit))}"
+    return Answer(words["ask"], say(f"short.{judged['verdict'].iloc[0]}"), because, words["link"])
 
 
-def _verdict_counts(claims: pd.DataFrame) -> str:
-    counts = claims["verdict"].value_counts()
-    parts = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS if verdict in counts]
-    return say("summary.counts", claims=len(claims), counts=", ".join(parts))
+def _by_family(name: str, study: Study, protocol: str | None) -> Answer | None:
+    """The answer that a family of comparisons gives, corrected within it."""
+    words = entry(f"questions.{name}")
+    rows = _family(study.tables.get("comparisons"), words["family"], protocol)
+    if rows.empty:
+        return None
+    apart, cells = apart_from(study.tables.get("comparisons"), words["family"], protocol)
+    effect = number(100 * rows["difference"].mean(), 1)
+    because = say(f"questions.{name}.reason", effect=effect, apart=apart, cells=cells)
+    return Answer(words["ask"], say("short.apart" if apart else "short.same"), because, words["link"])
 
 
-def _answer(question: str, claims: pd.DataFrame) -> Answer:
-    """Yes where all claims behind a question are reproduced, no where none is and none is open."""
-    verdicts = set(claims["verdict"])
-    if not verdicts:
-        short = "untested"
-    elif verdicts == {"reproduced"}:
-        short = "as_said"
-    elif verdicts == {"not reproduced"}:
-        short = "not_as_said"
-    elif "reproduced" in verdicts:
-        short = "partly" if "not reproduced" in verdicts else "partly_open"
-    else:
-        short = "not_shown" if "not reproduced" in verdicts else "open"
-    return Answer(question, say(f"answers.{short}"), [claim_sentence(row) for row in claims.to_dict("records")])
+def _solved(name: str, study: Study, protocol: str | None) -> Answer | None:
+    """Whether PPO with settings of its own solves the task, and which switch did most for it."""
+    words = entry(f"questions.{name}")
+    row = _best(study)
+    if row is None:
+        return None
+    switch = _best_switch(study)
+    texts = {"rate": _percent(row["success_rate"]), "final": _percent(row["final_success_rate"])}
+    more = say(f"questions.{name}.switch", switch=switch) if switch else ""
+    short = say("short.solved" if row["success_rate"] > 0.9 else "short.unsolved")
+    return Answer(words["ask"], short, say(f"questions.{name}.reason", **texts, switch=more), words["link"])
 
 
-def claim_sentence(row: Row) -> str:
-    """One claim with its verdict and, where there is one, the measured effect."""
-    text: str = "summary.claim_measured" if pd.notna(row["measured"]) else "summary.claim"
-    return say(text, id=row["id"], claim=str(row["claim"]).rstrip("."), verdict=row["verdict"], effect=effect(row))
+def _best(study: Study) -> Row | None:
+    """The cell with the highest success of the study with settings that a search found."""
+    tables = study.experiments.get(entry("questions.solve.link"))
+    rows = [] if tables is None else tables["cells"].dropna(subset="success_rate").to_dict("records")
+    return max(rows, key=lambda row: float(row["success_rate"])) if rows else None
 
 
-def effect(row: Row) -> str:
-    """The measured effect of a claim with its interval, three significant digits."""
-    values = [float(row[name]) for name in ("measured", "ci_low", "ci_high")]
-    if np.isnan(values[0]):
-        return "\N{EN DASH}"
-    texts = [short_number(value) for value in values]
-    return texts[0] if np.isnan(values[1]) else say("summary.interval", value=texts[0], low=texts[1], high=texts[2])
+def _best_switch(study: Study) -> str:
+    """The setting that, as the last one changed, does most for the success of the study that leads to the best."""
+    effects = study.experiments.get(entry("questions.solve.switches"), {}).get("effects")
+    if effects is None:
+        return ""
+    last = effects[(effects["metric"] == "success_rate") & (effects["effect"] == "last")].dropna(subset="difference")
+    return str(last.sort_values("difference")["setting"].iloc[-1]) if len(last) else ""
 
 
-def short_number(value: float) -> str:
-    """A number with about three significant digits and no exponent."""
-    if not np.isfinite(value):
-        return "\N{EN DASH}"
-    size = abs(value)
-    return number(value, 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3)
+def _family(comparisons: pd.DataFrame | None, family: str, protocol: str | None) -> pd.DataFrame:
+    if comparisons is None:
+        return pd.DataFrame()
+    rows = of_protocol(comparisons, protocol)
+    return rows[(rows["family"] == family) & (rows["metric"] == "success_rate")]
+
+
+def apart_from(comparisons: pd.DataFrame | None, family: str, protocol: str | None = None) -> tuple[int, int]:
+    """In how many comparisons of a family success differs beyond chance, corrected, and of how many."""
+    rows = _family(comparisons, family, protocol)
+    return (int((rows["p_holm"] < LEVEL).sum()), len(rows)) if len(rows) else (0, 0)
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f}{PERCENT}"
+
+
+def _controller(study: Study, name: str, protocol: str | None) -> float:
+    table = study.tables.get("controllers")
+    if table is None:
+        return float("nan")
+    rows = stochastic(table, protocol)
+    rows = rows[rows["controller"] == name]
+    return float(rows["success_rate"].iloc[0]) if len(rows) else float("nan")
+
+
+def _plain(study: Study, protocol: str | None) -> Row | None:
+    """The unshaped cell with the largest budget."""
+    cells = of_protocol(study.tables["cells"], protocol)
+    rows = cells[cells["variant"] == "none"].sort_values("budget").to_dict("records")
+    return rows[-1] if rows else None
+
+
+def numbers(study: Study, protocol: str | None = None) -> list[tuple[str, str]]:
+    """Three numbers that calibrate success: flailing, ending at the target, solved."""
+    plain = _plain(study, protocol)
+    values = {
+        "flailing": _controller(study, "untrained network", protocol),
+        "ending": float(plain["final_success_rate"]) if plain else float("nan"),
+        "solved": _controller(study, "inverse kinematics + PD", protocol),
+    }
+    return [(_percent(value), say(f"first.numbers.{name}")) for name, value in values.items() if np.isfinite(value)]
+
+
+def verdict_counts(study: Study) -> list[str]:
+    """How many claims come out how, under the text and under the released code."""
+    found = []
+    released = study.experiments.get("released", {})
+    for name, tables in (("first.counts", study.tables), ("first.counts_released", released)):
+        if "claims" in tables:
+            counts = tables["claims"]["verdict"].value_counts()
+            texts = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS if verdict in counts]
+            found.append(say(name, claims=len(tables["claims"]), counts=", ".join(texts)))
+    return found
+
+
+def why(study: Study, protocol: str | None = None) -> list[str]:
+    """Why the paper saw a gain, a line each."""
+    published = study.published
+    if published.merge(of_protocol(study.tables["cells"], protocol)[CELL], on=CELL).empty:
+        return []
+    return [text for text in (_one_run(study), _measure(study, protocol), _code(study), _left_out(study)) if text]
+
+
+def _published_extremes(published: pd.DataFrame) -> tuple[float, float]:
+    """Success of the unshaped published run with the largest budget, and of the best shaped one."""
+    plain = published[published["variant"] == "none"].sort_values("budget")
+    return float(plain["success_rate"].iloc[-1]), float(published["success_rate"].max())
+
+
+def _one_run(study: Study) -> str:
+    spread = study.tables.get("spread")
+    ratio = pd.DataFrame() if spread is None else spread[spread["quantity"] == "ratio"]
+    if ratio.empty:
+        return ""
+    none, best = _published_extremes(study.published)
+    low, high = (number(float(ratio[name].iloc[0]), 1) for name in ("q05", "q95"))
+    return say("why.one_run", low=low, high=high, published=number(best / none, 1))
+
+
+def _measure(study: Study, protocol: str | None) -> str:
+    untrained = _controller(study, "untrained network", protocol)
+    if not np.isfinite(untrained):
+        return ""
+    return say("why.measure", best=_percent(_published_extremes(study.published)[1]), untrained=_percent(untrained))
+
+
+def _code(study: Study) -> str:
+    released = study.experiments.get("released")
+    if not released:
+        return ""
+    shaped = released["comparisons"][released["comparisons"]["family"] == "none"]
+    rows = corrected(shaped, ("success_rate",)) if len(shaped) else shaped
+    rows = rows[rows["metric"] == "success_rate"] if len(rows) else rows
+    verdicts = say("why.code_no_verdicts")
+    if "claims" in released:
+        counts = released["claims"]["verdict"].value_counts()
+        verdicts = say(
+            "why.code_verdicts",
+            reproduced=counts.get("reproduced", 0),
+            not_reproduced=counts.get("not reproduced", 0),
+        )
+    apart = int((rows["p_holm"] < LEVEL).sum()) if len(rows) else 0
+    return say("why.code", apart=apart, cells=len(rows), verdicts=verdicts)
+
+
+def _left_out(study: Study) -> str:
+    """The published run that the tables leave out, where its success is the highest of all."""
+    every = study.every_published
+    left_out = every[~every["run"].isin(study.published["run"])]
+    if left_out.empty or left_out["success_rate"].max() < every["success_rate"].max():
+        return ""
+    row = left_out.sort_values("success_rate").iloc[-1]
+    rate = f"{100 * row['success_rate']:.1f}{PERCENT}"
+    return say("why.left_out", run=f"`{row['run']}`", rate=rate, count=len(every))
+
+
+def bars(study: Study, protocol: str | None = None) -> list[Bar]:
+    """The rows of the small picture: what flails, the paper's, ours, and what is possible."""
+    nan = float("nan")
+    cells = of_protocol(study.tables["cells"], protocol)
+    found = [Bar(say("first.bars.untrained"), _controller(study, "untrained network", protocol), nan, nan, ours=False)]
+    if len(study.published.merge(cells[CELL], on=CELL)):
+        for name, value in zip(("published_none", "published_best"), _published_extremes(study.published), strict=True):
+            found.append(Bar(say(f"first.bars.{name}"), value, nan, nan, ours=False))
+    shaped = cells[cells["variant"] != "none"].sort_values("success_rate").to_dict("records")
+    ours = {"none": _plain(study, protocol), "best": shaped[-1] if shaped else None}
+    ours["solved"] = _best(study)
+    for name, row in ours.items():
+        if row:
+            limits = (float(row["success_rate_low"]), float(row["success_rate_high"]))
+            found.append(Bar(say(f"first.bars.{name}"), float(row["success_rate"]), *limits, ours=True))
+    return [bar for bar in found if np.isfinite(bar.value)]
 
 
 def to_markdown(content: Summary) -> str:
-    """The summary for a notebook."""
-    lines = [" ".join(content.headline)]
-    lines += [f"- **{item.question}** {item.short} {' '.join(item.because)}" for item in content.answers]
-    return "\n\n".join([lines[0], "\n".join(lines[1:])]).strip()
-
-
-def claims_markdown(claims: pd.DataFrame) -> str:
-    """Every claim with published evidence, measured effect, test and verdict."""
-    headings = entry("summary.claims_headings")
-    lines = [f"| {' | '.join(headings)} |", f"|{':--|' * len(headings)}"]
-    for row in claims.to_dict("records"):
-        entries = (row["id"], row["claim"], row["published"], effect(row), row["test"], f"**{row['verdict']}**")
-        lines.append("| " + " | ".join(str(entry).replace("|", "\\|") for entry in entries) + " |")
-    return "\n".join(lines)
+    """The summary for a notebook and for the README."""
+    lines = [content.lead, *(f"- {item.question} **{item.short}** {item.because}" for item in content.answers)]
+    return "\n\n".join([lines[0], "\n".join(lines[1:]), " ".join(content.counts)]).strip()

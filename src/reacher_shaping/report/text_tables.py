@@ -14,19 +14,20 @@ from reacher_shaping.report.text import say
 
 @dataclass(frozen=True)
 class Grid:
-    """A table to show: its headings, its rows, and the columns that are text."""
+    """A table to show: its headings, its rows, the columns that are text, and its numbers in full as CSV."""
 
     headings: list[str]
     rows: list[list[str]]
     texts: frozenset[int] = frozenset({0})
+    csv: str = ""
 
 
 def of_table(table: pd.DataFrame) -> Grid:
-    """A table of `paper_tables` as `paper_tables.readable` reads it; names of variants and policies are text."""
+    """A table of `paper_tables` as `paper_tables.readable` reads it; names of cells and policies are text."""
     frame = paper_tables.readable(table)
-    names = {paper_tables.HEADINGS["variant"], paper_tables.HEADINGS["policy"]}
+    names = {paper_tables.HEADINGS[name] for name in ("setting", "policy")}
     texts = frozenset(place for place, heading in enumerate(frame.columns) if heading in names)
-    return Grid(list(frame.columns), frame.to_numpy().tolist(), texts)
+    return Grid(list(frame.columns), frame.to_numpy().tolist(), texts, paper_tables.to_csv(table))
 
 
 def to_markdown(grid: Grid) -> str:

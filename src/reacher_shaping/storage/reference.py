@@ -71,7 +71,7 @@ def manifest(
     The records are without their inputs.
     """
     numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads", "kernels", "core_type")
-    kept = ("algorithm", "seeds", "git", "machine", "versions", "outputs", *numbers)
+    kept = ("algorithm", "started", "finished", "seeds", "git", "machine", "versions", "outputs", *numbers)
 
     def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         return [{name: block[name] for name in kept if name in block} for block in given]
@@ -99,6 +99,6 @@ def published_bits(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {name: smallest[name] for name in kept}
 
 
-def _spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
+def spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
     """Environment steps and core hours of blocks."""
     return sum(block["env_steps"] for block in blocks), sum(block["cpu_seconds"] for block in blocks) / 3600

@@ -1,0 +1,132 @@
+"""The page in a real browser: read on a wide screen, a phone, in the dark, on paper, by keyboard, and without scripts.
+
+Debian's chromium is driven through its path; where there is none, or no playwright, the tests are skipped.
+"""
+
+import shutil
+
+import pytest
+import report_inputs
+import synthetic
+
+from reacher_shaping.report import html
+from reacher_shaping.settings.study import load_study
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path")
+WIDE, PHONE, PAPER = (1300, 900), (390, 844), (690, 980)  # the last is A4 without its margins, at 96 dots an inch
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    study = load_study(report_inputs.ROOT / "config.yaml").model_dump(mode="json")
+    path = folder / "report.html"
+    path.write_text(html.build(report_inputs.make(folder, study, synthetic.PAPER_GRID, 3)), encoding="utf-8")
+    return path.as_uri()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as play:
+        opened = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def visit(browser, address):
+    """Open the page: a function of the size of the window and what a browser's context takes."""
+    contexts = []
+
+    def open_page(size, where="", **options):
+        context = browser.new_context(viewport=dict(zip(("width", "height"), size, strict=True)), **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(120_000)
+        page.asked = []
+        page.on("request", lambda request: page.asked.append(request.url))
+        page.on("pageerror", lambda error: page.asked.append(str(error)))
+        page.goto(address + where)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+
+
+@pytest.mark.parametrize("size", [WIDE, PHONE])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_page_is_accessible_fits_its_width_and_asks_no_network(visit, size, scheme):
+    page = visit(size, color_scheme=scheme)
+    page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true; })")
+    broken = axe.Axe().run(page).response["violations"]
+    assert not [(rule["id"], rule["nodes"][0]["html"]) for rule in broken]
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert all(url.startswith(("file:", "data:")) for url in page.asked)
+
+
+def test_dark_readers_get_a_dark_page(visit):
+    light, dark = (
+        visit(WIDE, color_scheme=scheme).evaluate("getComputedStyle(document.body).backgroundColor")
+        for scheme in ("light", "dark")
+    )
+    assert light == "rgb(255, 255, 255)"
+    assert max(int(part) for part in dark.removeprefix("rgb(").rstrip(")").split(",")) < 60
+
+
+def test_a_row_of_the_claims_shows_value_and_both_verdicts_on_a_phone(visit):
+    page = visit(PHONE)
+    for part in (".measured", ".badge >> nth=0", ".badge >> nth=1"):
+        box = page.locator(f"#C1 summary {part}").first.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= PHONE[0]
+
+
+def test_first_column_stays_when_a_table_is_moved_on_a_phone(visit):
+    page = visit(PHONE)
+    box = page.locator("#table_2 .scroll")
+    before = page.locator("#table_2 tbody th").first.bounding_box()["x"]
+    box.evaluate("box => { box.scrollLeft = 300; }")
+    assert page.locator("#table_2 tbody th").first.bounding_box()["x"] == pytest.approx(before, abs=1)
+
+
+def test_paper_shows_whole_tables_and_opened_claims(visit):
+    page = visit(PAPER)
+    page.emulate_media(media="print")
+    wider = page.locator("table").evaluate_all(
+        "tables => tables.filter(one => one.scrollWidth > innerWidth).map(one => one.caption.textContent)"
+    )
+    assert wider == []
+    assert page.pdf(format="A4").startswith(b"%PDF")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("#C1 dl").bounding_box()["height"] > 0
+
+
+def test_tables_sort_by_keyboard_and_filter(visit):
+    page = visit(WIDE)
+    rows = page.locator("#table_2 tbody tr")
+    head = page.locator("#table_2 thead th", has_text="Rank").locator("button")
+    head.focus()
+    page.keyboard.press("Enter")
+    page.wait_for_function("document.querySelector('#table_2 tbody td').textContent.trim() === '17'")
+    assert page.locator("#table_2 th[aria-sort]").count() == 1
+    page.locator("#table_2 input").fill("decay 200K")
+    assert sum(rows.nth(number).is_visible() for number in range(rows.count())) == 3
+
+
+def test_a_link_opens_its_claim_and_verdicts_filter(visit):
+    page = visit(WIDE, "#C3")
+    assert page.locator("#C3").get_attribute("open") is not None
+    page.locator("#verdicts").select_option("reproduced")
+    assert page.locator("#C18").is_visible()
+    assert not page.locator("#C3").is_visible()
+
+
+def test_everything_can_be_read_without_scripts(visit):
+    page = visit(WIDE, java_script_enabled=False)
+    page.locator("#C1 summary").click()
+    assert page.locator("#C1 dl").is_visible()
+    assert not page.locator("#verdicts").is_visible()

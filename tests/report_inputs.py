@@ -1,0 +1,56 @@
+"""What a report is made of, from made-up tables, for the tests of the page."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import synthetic
+from matplotlib.figure import Figure
+
+from reacher_shaping.analysis import comparisons, single_seed_studies
+from reacher_shaping.figures.style import save
+from reacher_shaping.report import html, loader
+
+ROOT = Path(__file__).parents[1]
+
+MANIFEST = {
+    "git": {"commit": "0123456789abcdef0123", "dirty": True},
+    "machine": {"cpu": "A processor", "cores": 2, "system": "Linux"},
+    "threads": 1,
+    "versions": {"python": "3.11.7", "torch": "2.13.0"},
+    "env_steps": 5_000_000,
+    "wall_seconds": 900.0,
+    "cpu_seconds": 890.0,
+    "env_steps_per_second": 5555.6,
+}
+
+
+def make(folder, study, grid, seeds, **changes):
+    cells = synthetic.cells(grid, seeds)
+    sizes = {"figure_1": (2, 1), "figure_2": (1, 2), "lottery": (1, 1), "forest": (2, 2), "peers": (3, 1)}
+    figures = {name: Figure(figsize=size) for name, size in sizes.items()}
+    paths = {name: save(figure, folder / "figures" / name, ("svg", "pdf"))[0] for name, figure in figures.items()}
+    (folder / "media").mkdir()
+    for key in grid:
+        for kind in ("gif", "mp4"):
+            name = f"{key[0]}-{key[1]}-{key[2]}-alpha{key[3]:g}.{kind}"
+            (folder / "media" / name).write_bytes(kind.encode() + bytes(range(200)))
+    runs = synthetic.runs(grid, seeds)
+    studies = single_seed_studies.single_seed_studies(runs, np.random.default_rng(0), 50)
+    tables = {
+        "cells": cells, "runs": runs, "correlation": synthetic.correlation(), "controllers": synthetic.controllers(),
+        "power": comparisons.power_frame(runs, synthetic.published()), "variance": comparisons.variance_frame(runs),
+        "comparisons": comparisons.comparison_frame(runs), "peers": synthetic.peers(),
+        "winners": single_seed_studies.winners_frame(studies), "spread": single_seed_studies.spread_frame(studies),
+        "claims": synthetic.claims(), "claim_parts": synthetic.claim_parts(),
+    }  # fmt: skip
+    kept = changes.pop("only", tables)
+    tables = {name: table for name, table in tables.items() if name in kept}
+    published = synthetic.published()
+    files = loader.Study(tables, {}, published, published, pd.DataFrame(), synthetic.ledger())
+    given = {
+        "settings": study, "study": files, "figures": paths,
+        "media": sorted((folder / "media").iterdir()), "manifests": [MANIFEST] * 3,
+        "notebooks": [folder / "results" / "notebooks" / "story.html"], "settings_hash": "ab" * 32,
+    }  # fmt: skip
+    return html.Inputs(**(given | changes))
