@@ -6,11 +6,16 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 QUICK := --directory build/quick --configfile workflow/quick.yaml
 FROM_TABLES := plot_figures plot_experiment format_tables run_notebook
+# Where jobs run: PROFILE=slurm, or the path of a profile of your own; VERBOSE=1 says all that Snakemake says.
+PROFILE ?= default
+PLUGIN := $(if $(findstring slurm,$(PROFILE)),python -c 'import snakemake_executor_plugin_slurm' 2> /dev/null \
+	|| python -m pip install --quiet --editable '.[slurm]')
+SNAKEMAKE := snakemake --workflow-profile $(PROFILE) $(if $(VERBOSE),--quiet host)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce quick report compare check-bits archive verify reference test test-fast check lock bench peers clean
+.PHONY: help setup reproduce quick plan cells restore report compare check-bits archive verify reference test test-fast check lock bench peers clean
 
 help: ## what each target does
 	@awk -F ':.*## ' '/^[a-z_-]+:.*## / {printf "make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -24,21 +29,32 @@ $(READY): pyproject.toml requirements.txt workflow/install.py
 	$(BIN)/python -m pip install --quiet --no-deps --editable .
 	@touch $@
 
-reproduce: $(READY) ## the study of config.yaml; called again, it goes on
+reproduce: $(READY) ## the study of config.yaml; called again, it goes on; on a cluster: PROFILE=slurm
+	@$(PLUGIN)
 	@python workflow/unlock.py .
-	snakemake --quiet rules
+	$(SNAKEMAKE)
 	@echo "The report: $(CURDIR)/report/report.html"
 
 quick: $(READY) ## the same at toy scale, into build/quick/
+	@$(PLUGIN)
 	@mkdir -p build/quick
 	@python workflow/unlock.py build/quick
-	snakemake $(QUICK) --quiet rules
+	$(SNAKEMAKE) $(QUICK)
 	@echo "The report: $(CURDIR)/build/quick/report/report.html"
+
+plan: $(READY) ## what would run, why, and how long it takes
+	@python workflow/plan.py $(TARGET)
+
+cells: $(READY) ## every cell with its state; CELL=l2-500000 lists those of that name
+	@python workflow/cells.py $(CELL)
+
+restore: $(READY) ## the blocks of an archived study, so that nothing of it is trained again: make restore STUDY=study.zip
+	@python workflow/restore.py $(STUDY)
 
 report: $(READY) ## figures, tables, notebooks and report again: of results/, or of the reference run where there are none
 ifneq ($(wildcard results/runs.parquet),)
 	@python workflow/unlock.py .
-	snakemake --allowed-rules $(FROM_TABLES) build_report build_crate --forcerun run_notebook build_report --quiet rules \
+	$(SNAKEMAKE) --allowed-rules $(FROM_TABLES) build_report build_crate --forcerun run_notebook build_report \
 		-- report/report.html ro-crate-metadata.json
 	@echo "The report: $(CURDIR)/report/report.html"
 else
@@ -46,7 +62,7 @@ else
 	@rm -rf build/reference/results/peers.parquet build/reference/results/experiments
 	@cp -rp report/reference/* build/reference/results/
 	@python workflow/unlock.py build/reference
-	snakemake --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report --quiet rules -- report/reference.html
+	$(SNAKEMAKE) --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report -- report/reference.html
 	@echo "The report of the reference run: $(CURDIR)/build/reference/report/reference.html"
 endif
 
@@ -87,8 +103,8 @@ bench: $(READY) ## speed beside Stable-Baselines3 and the plain loop, into bench
 
 peers: $(READY) ## Stable-Baselines3 PPO, SAC and TD3 on the same task (hours), then the study with them in it
 	@python workflow/unlock.py .
-	snakemake --quiet rules -- peers
-	snakemake --quiet rules
+	$(SNAKEMAKE) -- peers
+	$(SNAKEMAKE)
 
 clean: ## removes results, figures, report and build; keeps .venv
 	rm -rf build report/report.html ro-crate-metadata.json .checksums .snakemake

@@ -7,7 +7,7 @@ from reacher_shaping.settings.study import settings_hash
 
 min_version("9.0")
 
-HERE = Path(workflow.basedir)
+HERE = Path(workflow.current_basedir.get_path_or_uri(secret_free=True))  # also where another workflow imports this one
 
 
 include: "workflow/rules/common.smk"
@@ -17,7 +17,22 @@ STUDY = or_stop(read_study)
 SETTINGS_HASH = settings_hash(STUDY)
 
 
+onstart:
+    take_folder()
+    watch()
+
+
+onsuccess:
+    remove_finished_checkpoints()
+    CheckpointStore(STORE).clear()
+
+
+onerror:
+    remove_finished_checkpoints()
+
+
 include: "workflow/rules/cells.smk"
+include: "workflow/rules/resources.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/peers.smk"
@@ -30,6 +45,7 @@ include: "workflow/rules/notebooks.smk"
 include: "workflow/rules/media.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/publish.smk"
+include: "workflow/rules/watch.smk"
 
 
 # Intermediate files are named here too: a changed job that failed has lost its outputs, and without them in the

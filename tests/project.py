@@ -60,11 +60,11 @@ class Project:
 
     def planned(self, *arguments: str) -> dict[str, list[str]]:
         """Rules that a dry run would execute, each with the outputs of its jobs."""
-        done = self.snakemake("--dry-run", *arguments)
+        done = self.snakemake("--quiet", "host", "--dry-run", *arguments)
         assert done.returncode == 0, done.stderr[-6000:]
         jobs: dict[str, list[str]] = {}
         for rule, outputs in re.findall(
-            r"^rule (\w+):\n(?:    input: .*\n)?    output: (.*)$", done.stdout, re.MULTILINE
+            r"^ *(?:local)?rule (\w+):\n(?: +input: .*\n)? +output: (.*)$", done.stdout, re.MULTILINE
         ):
             jobs.setdefault(rule, []).extend(outputs.split(", "))
         return jobs

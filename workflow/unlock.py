@@ -1,52 +1,52 @@
-"""Remove the lock that a killed Snakemake has left in a folder: only when none of its processes works there any more.
+"""Remove the lock that a killed Snakemake has left in a folder: only on its own machine and when it is gone.
 
-    python workflow/unlock.py [FOLDER]
+    python workflow/unlock.py [--force] [FOLDER]
 
-Jobs outlive a killed Snakemake; they are waited for. A Snakemake that is alive keeps its lock.
-Processes of other machines on a shared disk are not seen.
+Jobs outlive a killed Snakemake; they are waited for. Where another Snakemake works in the folder, or may, one line
+says which, and the exit code is 1. `--force` frees the folder all the same.
 """
 
-import os
+import argparse
 import sys
-import time
 from pathlib import Path
 
+from reacher_shaping.jobs import folder_lock
 
-def main(folder: Path) -> None:
+
+def main(folder: Path, *, force: bool) -> None:
+    """Free the folder, or raise FolderTakenError."""
+    holder = None if force else folder_lock.require_free(folder)
     locks = folder / ".snakemake" / "locks"
-    waiting = False
-    while locks.is_dir() and any(locks.iterdir()):
-        commands = list(working_in(folder))
-        if any(is_scheduler(command) for command in commands):
+    left = list(locks.glob("*")) if locks.is_dir() else []
+    if not left:
+        folder_lock.forget(folder)
+        return
+    if holder is None and not force:
+        raise folder_lock.FolderTakenError(folder, None, alive=False)
+    if not force:
+        wait_for_jobs(folder)
+    for lock in left:
+        lock.unlink(missing_ok=True)
+    folder_lock.forget(folder)
+    print(f"Removed the lock that {holder or 'a snakemake'} left in {folder}.")
+
+
+def wait_for_jobs(folder: Path) -> None:
+    """Return when no job works in the folder any more."""
+    with folder_lock.no_jobs(folder, wait=False) as free:
+        if free:
             return
-        if not commands:
-            for lock in locks.iterdir():
-                lock.unlink()
-            print(f"Removed the lock that a killed snakemake left in {folder}.")
-            return
-        if not waiting:
-            print(f"Waiting for {len(commands)} processes that a killed snakemake left in {folder}.", flush=True)
-            waiting = True
-        time.sleep(1)
-
-
-def working_in(folder: Path):
-    """Command lines of Snakemake's processes whose working directory is `folder`."""
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            here = (process / "cwd").readlink() == folder.resolve()
-            command = (process / "cmdline").read_text(errors="replace").split("\0")
-        except OSError:  # it has ended, or is another user's
-            continue
-        names = [Path(part).name for part in command]
-        if here and process.name != str(os.getpid()) and ("snakemake" in names or ".snakemake/scripts" in str(command)):
-            yield command
-
-
-def is_scheduler(command) -> bool:
-    """Whether a command is a Snakemake that schedules jobs, not one that runs a single job for it."""
-    return "snakemake" in [Path(part).name for part in command] and "--mode" not in command
+    print(f"Waiting for the jobs that a killed snakemake left in {folder}.", flush=True)
+    with folder_lock.no_jobs(folder, wait=True):
+        return
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else ""))
+    parser = argparse.ArgumentParser(description="Remove the lock that a killed snakemake has left in a folder.")
+    parser.add_argument("folder", type=Path, nargs="?", default=Path())
+    parser.add_argument("--force", action="store_true", help="also where nothing tells that it is gone")
+    given = parser.parse_args()
+    try:
+        main(given.folder, force=given.force)
+    except folder_lock.FolderTakenError as error:
+        sys.exit(str(error))

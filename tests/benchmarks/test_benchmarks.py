@@ -139,3 +139,13 @@ def test_cost_of_a_study_is_the_sum_over_its_blocks():
     episodes = 23 * 12 * 2 * 1000 * 50
     assert found.core_seconds == pytest.approx(12 * steps / 20_000 + episodes / 50_000 + 23 * 2 * 2 * 3)
     assert found.longest_job == pytest.approx(6 + 10 * (489 * 2048 / 20_000 + 100_000 / 50_000))
+
+
+def test_jobs_start_in_order_on_the_core_that_is_free_first():
+    """3, 3 and 2 s on two cores: the third starts at 3 s, so 5 s, and 8 of 10 core seconds are used."""
+    from schedule import Schedule, simulate
+
+    assert simulate([3, 3, 2], cores=2) == Schedule(5, 0.8)
+    assert simulate([3, 3, 2], cores=1).wall == 8
+    assert simulate([3, 3, 2], cores=64).wall == 3
+    assert simulate([1, 1, 1], cores=64, seconds_per_submission=2.0).wall == 5

@@ -54,7 +54,8 @@ def test_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch, aft
     lines = []
     resumed, done = trained(tmp_path / "cut", lines)
     assert done == 4 - after
-    assert lines[0] == f"goes on from iteration {after} of 4"
+    went_on = f"goes on from iteration {after} of 4"
+    assert lines[0] == ("takes over the training that a job before has finished" if after == 4 else went_on)
     assert torch.equal(whole.rows, resumed.rows)
     assert whole.progress_frame().equals(resumed.progress_frame())
     assert whole.episodes_frame().equals(resumed.episodes_frame())
@@ -73,17 +74,17 @@ def test_time_before_an_interruption_is_counted(tmp_path, monkeypatch):
     assert cpu > 0
 
 
-def test_finished_block_leaves_no_checkpoint(tmp_path):
-    trained(tmp_path / "key", [], seconds_per_checkpoint=0.0)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_half_a_checkpoint_of_a_killed_process_is_cleared_away(tmp_path):
-    folder = tmp_path / "key"
-    folder.mkdir()
-    (folder / ".checkpoint.abc.pt").write_bytes(b"half")
-    trained(folder, [])
-    assert list(tmp_path.iterdir()) == []
+def test_finished_training_is_taken_over_until_its_checkpoint_is_removed(tmp_path):
+    """The scheduler of the job before may have been killed: it knows of no result and starts the job again."""
+    first, done = trained(tmp_path / "key", [])
+    assert done == 4
+    assert sorted(path.name for path in (tmp_path / "key").iterdir()) == ["checkpoint.pt", training_job.FINISHED]
+    lines = []
+    again, done = trained(tmp_path / "key", lines)
+    assert (done, lines) == (0, ["takes over the training that a job before has finished"])
+    assert torch.equal(first.rows, again.rows)
+    assert first.progress_frame().equals(again.progress_frame())
+    assert [path.name for path in tmp_path.iterdir()] == ["key"], "no lock is left"
 
 
 def test_checkpoint_stays_until_the_result_is_saved(tmp_path):
@@ -93,7 +94,7 @@ def test_checkpoint_stays_until_the_result_is_saved(tmp_path):
         training_job.trained_block(CELL, SEEDS, radius=0.02, folder=folder, report=print, seconds_per_checkpoint=0.0),
     ):
         raise OSError("disk full")
-    assert (folder / "checkpoint.pt").exists()
+    assert [path.name for path in folder.iterdir()] == ["checkpoint.pt"], "not marked as finished"
     assert trained(folder, [])[1] == 0
 
 

@@ -149,6 +149,39 @@ def test_snakemake_stopped_by_a_signal(project, undisturbed, number):
     assert_whole(project, undisturbed)
 
 
+def test_block_that_an_orphan_has_finished_is_taken_over(project, undisturbed):
+    """Snakemake, killed, never recorded the block, and deletes its files; the training is not done again."""
+    running = project.start("-m", "snakemake", "--cores", "1", "--", TARGET)
+    wait_for(lambda: checkpoints(project))
+    running.kill()
+    running.wait()
+    running.stdout.close(), running.stderr.close()
+    wait_for(lambda: list(project.folder.glob(f"{CELL}/*/training.json")))
+    wait_for(lambda: not processes(project, ".train_block.py"))
+    [finished] = project.folder.glob(f"{CELL}/*/policy.pt")
+    done = reproduce(project)
+    assert done.returncode == 0, done.stderr[-3000:]
+    log = project.folder / "results/logs" / finished.parent.relative_to(project.folder / "results") / "train.log"
+    assert log.read_text() == "takes over the training that a job before has finished\n"
+    assert_whole(project, undisturbed)
+
+
+def test_second_snakemake_in_a_folder_is_told_who_works_there(project):
+    running = project.start("-m", "snakemake", "--", TARGET)
+    try:
+        wait_for(lambda: checkpoints(project))
+        unlocked = project.python("workflow/unlock.py", ".")
+        assert unlocked.returncode == 1
+        assert f"is in use by snakemake, process {running.pid} of " in unlocked.stderr
+        other = project.snakemake("--cores", "1", "--", "results/controllers.parquet")  # none of the first one's files
+        assert other.returncode != 0
+        assert f"is in use by snakemake, process {running.pid} of " in other.stderr
+        assert "Traceback" not in other.stderr
+    finally:
+        running.send_signal(signal.SIGTERM)
+        running.communicate()
+
+
 def test_failure_between_training_and_evaluation_keeps_the_policies_and_shows_nothing_old(project, undisturbed):
     project.run("--", TARGET)
     policies = {path: path.stat().st_mtime_ns for path in project.folder.glob(f"{CELL}/*/policy.pt")}

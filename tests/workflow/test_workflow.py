@@ -295,10 +295,20 @@ def test_setting_of_one_cell_reruns_that_cell_and_what_depends_on_it(project):
 
 
 def test_evaluation_setting_evaluates_again_without_training(project):
-    with project.configured(evaluation={"episodes": 21, "radius": 0.02}):
+    with project.configured(evaluation={"episodes": 21, "radius": 0.03}):
         jobs = project.planned()
     assert "train_block" not in jobs
     assert len([name for name in jobs["evaluate_block"] if name.endswith("episodes.parquet")]) == 4
+
+
+def test_removed_record_of_a_training_is_noticed(project):
+    path = project.folder / f"{NONE}/seeds0-0/training.json"
+    content = path.read_bytes()
+    path.unlink()
+    try:
+        assert f"{NONE}/seeds0-0/training.json" in project.planned()["train_block"]
+    finally:
+        path.write_bytes(content)
 
 
 def test_more_seeds_train_only_the_new_blocks(project):

@@ -8,7 +8,7 @@ PUBLISHED = {
 }
 
 
-if Path("results/runs.parquet").exists() and len({*map(os.path.exists, BLOCK_FILES)}) == 2:
+if not STORE and Path("results/runs.parquet").exists() and len({*map(os.path.exists, BLOCK_FILES)}) == 2:
     # Asked for one of the tables by name, Snakemake would call it up to date (its issue 1978).
     print("Runs are missing, so the tables in results/ are old; `snakemake` makes both again.", file=sys.stderr)
 
@@ -17,6 +17,7 @@ rule aggregate_runs:
     input:
         progress=expand("{block}/progress.parquet", block=BLOCKS),
         episodes=expand("{block}/episodes.parquet", block=BLOCKS),
+        manifests=ancient(expand("{block}/manifest.json", block=BLOCKS)),
     output:
         **tables_made("aggregate_runs"),
     log:
@@ -24,6 +25,9 @@ rule aggregate_runs:
     benchmark:
         "results/benchmarks/aggregate_runs.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing(30),
     params:
         cells=BLOCK_CELLS,
         code=code("aggregate_runs"),
@@ -42,6 +46,9 @@ rule correlate:
     benchmark:
         "results/benchmarks/correlate.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         code=code("correlate"),
     script:
@@ -51,6 +58,7 @@ rule correlate:
 rule summarise_episodes:
     input:
         episodes=expand("{block}/episodes.parquet", block=BLOCKS),
+        manifests=ancient(expand("{block}/manifest.json", block=BLOCKS)),
         long_episodes=expand("{block}/long_episodes.parquet", block=BLOCKS),
     output:
         **tables_made("summarise_episodes"),
@@ -59,6 +67,9 @@ rule summarise_episodes:
     benchmark:
         "results/benchmarks/summarise_episodes.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing(30),
     params:
         cells=BLOCK_CELLS,
         code=code("summarise_episodes"),
@@ -77,6 +88,9 @@ rule compare_runs:
     benchmark:
         "results/benchmarks/compare_runs.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         protocol=STUDY.cells[0].protocol.name,
         root_seed=STUDY.root_seed,
@@ -95,6 +109,9 @@ rule check_results:
     benchmark:
         "results/benchmarks/check_results.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         cells=[cell.key for cell in STUDY.cells],
         seeds=STUDY.seeds,
@@ -121,6 +138,9 @@ rule judge_claims:
     benchmark:
         "results/benchmarks/judge_claims.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         protocols=[STUDY.cells[0].protocol.name],
         twins={},

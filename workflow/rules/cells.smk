@@ -33,3 +33,24 @@ def evaluation_of(cell):
 def tasks_of(cells):
     """The tasks that a script looks up by name for these cells, as `code` takes them."""
     return tuple(sorted({cell.chosen_code[0] for cell in cells}))
+
+
+def seeds_of(cell):
+    """Runs of a cell, as many as the study that asks for most."""
+    counts = {name: experiment.seeds for name, experiment in STUDY.experiments.items()}
+    asking = [counts[name] for name, cells in EXPERIMENTS.items() if cell in cells]
+    return max([STUDY.seeds] * (cell in STUDY.cells) + asking)
+
+
+# Every cell is a target of its name, `snakemake -- paper-l2-500000-alpha0.5`; `make cells` lists the names.
+for cell in CELLS.values():
+
+    rule:
+        name:
+            cell.name
+        input:
+            expand(
+                "{block}/{file}",
+                block=blocks([cell], seeds_of(cell)),
+                file=["policy.pt", "progress.parquet", "training.json", "episodes.parquet", "manifest.json"],
+            ),

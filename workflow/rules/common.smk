@@ -1,11 +1,15 @@
 # Functions that several stages share.
+import atexit
 import json
 import os
 import re
+import shutil
 import sys
 from functools import cache
 
 from reacher_shaping import processor
+from reacher_shaping.jobs import folder_lock
+from reacher_shaping.jobs.checkpoint_store import CheckpointStore
 from reacher_shaping.settings.base import ConfigError, short
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.settings.yaml_file import merged
@@ -19,6 +23,21 @@ def or_stop(read):
         return read()
     except ValueError as error:
         sys.exit(f"ConfigError: {error}")
+    except folder_lock.FolderTakenError as error:
+        sys.exit(str(error))
+
+
+def take_folder():
+    """One Snakemake at a time works in a folder; another is told which one does."""
+    atexit.register(folder_lock.release, or_stop(lambda: folder_lock.hold(Path())))
+
+
+def remove_finished_checkpoints():
+    """Training jobs keep their last checkpoint until Snakemake has recorded all outputs (see `jobs.training_job`)."""
+    incomplete = Path(".snakemake/incomplete")
+    if not incomplete.is_dir() or not any(incomplete.iterdir()):
+        for mark in Path("results/.checkpoints").glob("*/finished"):
+            shutil.rmtree(mark.parent)
 
 
 def read_study():
@@ -41,8 +60,20 @@ def read_study():
 
 
 def source(path):
-    """A file of the repository, relative to the working directory, so that a moved clone reruns nothing."""
-    return os.path.relpath(HERE / path)
+    """A file of the repository, relative to the working directory, so that a moved clone reruns nothing.
+
+    It lies with the workflow, wherever `--default-storage-provider` puts the study's files.
+    """
+    return local(os.path.relpath(HERE / path))
+
+
+# Where the study's files go if not to this disk, such as s3://bucket/study; training jobs keep their checkpoints there too.
+STORE = workflow.storage_settings.default_storage_prefix or "" if workflow.storage_settings else ""
+
+
+def made(path):
+    """Whether a file of the study is there already, on this disk or in the store, below the prefix of a module."""
+    return exists(workflow.modifier.path_modifier.replace_prefix(path))
 
 
 WORDS = source("src/reacher_shaping/report/text.yaml")

@@ -12,9 +12,12 @@ rule evaluate_block:
         "results/logs/{cell}/{block}/evaluate.log",
     benchmark:
         "results/benchmarks/{cell}/{block}/evaluate.tsv"
+    group:
+        "block"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
+        runtime=evaluation_minutes,
     params:
         evaluation=lambda wildcards: evaluation_of(CELLS[wildcards.cell]),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
@@ -27,13 +30,19 @@ rule evaluate_block:
 rule evaluate_long:
     input:
         policy="results/{cell}/{block}/policy.pt",
+        training=ancient("results/{cell}/{block}/training.json"),
     output:
         "results/{cell}/{block}/long_episodes.parquet",
     log:
         "results/logs/{cell}/{block}/evaluate_long.log",
     benchmark:
         "results/benchmarks/{cell}/{block}/evaluate_long.tsv"
+    group:
+        "block"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=evaluation_minutes,
     params:
         evaluation=lambda wildcards: evaluation_of(CELLS[wildcards.cell]),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
@@ -51,6 +60,9 @@ rule evaluate_controllers:
     benchmark:
         "results/benchmarks/evaluate_controllers.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         evaluation=as_json(STUDY.evaluation.model_dump()),
         protocols=protocols_of(STUDY.cells),

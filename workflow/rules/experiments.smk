@@ -1,6 +1,6 @@
 # The further studies of config.yaml, each an optional target of its name: `snakemake attribution`. Once made, they are
 # part of the report: MADE are those whose tables are there.
-MADE = [name for name in EXPERIMENTS if all(Path(path).exists() for path in tables_of(name))]
+MADE = [name for name in EXPERIMENTS if all(made(path) for path in tables_of(name))]
 MADE_TABLES = [path for name in MADE for path in tables_of(name)]
 MADE_FIGURES = [path for name in MADE for path in figures_of(name)]
 
@@ -13,6 +13,7 @@ wildcard_constraints:
 use rule aggregate_runs as aggregate_experiment with:
     input:
         progress=of_blocks("progress.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
         episodes=of_blocks("episodes.parquet"),
     output:
         **tables_made("aggregate_experiment", "{experiment}"),
@@ -80,6 +81,7 @@ rule summarise_experiment:
         **PUBLISHED,
         runs="results/experiments/{experiment}/runs.parquet",
         progress=of_blocks("progress.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
     output:
         **tables_made("summarise_experiment", "{experiment}"),
     log:
@@ -87,6 +89,9 @@ rule summarise_experiment:
     benchmark:
         "results/benchmarks/experiments/{experiment}/summarise.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         cells=of_experiment(block_cells),
         code=code("summarise_experiment"),
@@ -126,6 +131,9 @@ rule measure_effects:
     wildcard_constraints:
         experiment=one_of(name for name, study in STUDY.experiments.items() if study.switches),
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         switches=lambda wildcards: as_json(STUDY.experiments[wildcards.experiment].switches.model_dump()),
         protocols=of_experiment(protocols_of),
@@ -187,6 +195,9 @@ rule compare_with_peers:
     wildcard_constraints:
         experiment=one_of(name for name in EXPERIMENTS if peers_of(name)),
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         protocol=of_experiment(lambda cells, seeds: cells[0].protocol.name),
         code=code("compare_with_peers"),
@@ -205,6 +216,9 @@ rule plot_experiment:
     benchmark:
         "results/benchmarks/experiments/{experiment}/plot_{view}.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         code=code("plot_experiment"),
     script:

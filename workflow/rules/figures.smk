@@ -25,6 +25,9 @@ rule plot_figures:
     benchmark:
         "results/benchmarks/plot_figures.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         names=FIGURE_NAMES,
         radius=STUDY.evaluation.radius,
@@ -45,6 +48,9 @@ rule format_tables:
     benchmark:
         "results/benchmarks/format_tables.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         code=code("format_tables"),
     script:

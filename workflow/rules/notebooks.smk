@@ -9,6 +9,9 @@ rule run_notebook:
         MADE_TABLES,
         **PUBLISHED,
         words=WORDS,
+        training_logs=source("report/published/training_logs.csv"),
+        left_out=source("report/published/left_out.csv"),
+        claims="results/claims.csv",
         source=lambda wildcards: NOTEBOOK_SOURCES[wildcards.notebook],
     output:
         "results/notebooks/{notebook}.ipynb",
@@ -18,7 +21,12 @@ rule run_notebook:
         "results/benchmarks/notebooks/{notebook}.tsv"
     wildcard_constraints:
         notebook=one_of(NOTEBOOK_SOURCES),
+    group:
+        "notebooks"
     threads: 1
+    resources:
+        mem_mb=growing(1500),
+        runtime=growing(10),
     params:
         code=code("run_notebook"),
         notebook_code=lambda wildcards: code_hash(NOTEBOOK_SOURCES[wildcards.notebook]),

@@ -2,7 +2,7 @@
 PEER_RUNS = expand(
     "results/peers/{algorithm}/seed{seed}.parquet", algorithm=STUDY.peers.budgets, seed=range(STUDY.peers.seeds)
 )
-PEERS = [path for path in ["results/peers.parquet"] if Path(path).exists()]  # an input only once it is there
+PEERS = [path for path in ["results/peers.parquet"] if made(path)]  # an input only once it is there
 
 
 rule peers:
@@ -24,7 +24,8 @@ rule train_peer:
         seed=r"\d+",
     threads: 1
     resources:
-        mem_mb=2000,
+        mem_mb=growing(2000),
+        runtime=lambda wildcards, attempt: attempt * minutes(STUDY.peers.budgets[wildcards.algorithm] / 50),
     params:
         budget=lambda wildcards: STUDY.peers.budgets[wildcards.algorithm],
         protocol=as_json(STUDY.cells[0].protocol.model_dump()),
@@ -45,6 +46,9 @@ rule gather_peers:
     benchmark:
         "results/benchmarks/gather_peers.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         code=code("gather_peers"),
     script:

@@ -28,6 +28,9 @@ rule build_crate:
     benchmark:
         "results/benchmarks/build_crate.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         study=as_json(STUDY.model_dump(mode="json")),
         settings_hash=SETTINGS_HASH,

@@ -1,9 +1,9 @@
 # From everything to one HTML file.
-# Every file of the blocks but the Monitor folders: a folder has no checksum, so one made again with the same bytes would
-# count as changed. The job that makes it also makes the policy.
+# Every file of the blocks but the Monitor folders and the records of training: a folder has no checksum, and a record
+# tells times, so one made again with the same results would count as changed. The job that makes them makes the policy.
 rule build_report:
     input:
-        [name for name in BLOCK_FILES if not name.endswith("monitor")],
+        [name for name in BLOCK_FILES if not name.endswith(("monitor", "training.json"))],
         FORMATTED_TABLES,
         "results/check.txt",
         **PUBLISHED,
@@ -26,6 +26,9 @@ rule build_report:
     benchmark:
         "results/benchmarks/build_report.tsv"
     threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         study=as_json(STUDY.model_dump(mode="json")),
         settings_hash=SETTINGS_HASH,

@@ -12,7 +12,8 @@ if STUDY.search:
             "results/benchmarks/search.tsv"
         threads: 1
         resources:
-            mem_mb=1000,
+            mem_mb=growing(1000),
+            runtime=growing(24 * 60),
         params:
             search=as_json(STUDY.search.model_dump()),
             protocol=as_json(STUDY.protocols[STUDY.search.protocol].model_dump()),

@@ -3,7 +3,7 @@ BLOCKS = blocks(STUDY.cells, STUDY.seeds)
 BLOCK_FILES = expand(
     "{block}/{file}",
     block=BLOCKS,
-    file=["policy.pt", "progress.parquet", "monitor", "episodes.parquet", "manifest.json"],
+    file=["policy.pt", "progress.parquet", "monitor", "training.json", "episodes.parquet", "manifest.json"],
 )
 
 
@@ -23,13 +23,16 @@ rule train_block:
     benchmark:
         "results/benchmarks/{cell}/{block}/train.tsv"
     retries: 1
+    group:
+        "block"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=growing(1000),
+        runtime=training_minutes,
+        checkpoints=STORE or "local",
     params:
         cell=lambda wildcards: as_json(CELLS[wildcards.cell].settings()),
         seeds=lambda wildcards: list(SEEDS[wildcards.block]),
-        radius=lambda wildcards: STUDY.radius_of(CELLS[wildcards.cell]),
         code=lambda wildcards: code("train_block", CELLS[wildcards.cell].chosen_code),
     script:
         "../scripts/train_block.py"

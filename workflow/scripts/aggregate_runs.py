@@ -10,20 +10,21 @@ from reacher_shaping.storage.files import read_table, write_table
 from reacher_shaping.storage.provenance import unchanged
 
 params, output = snakemake.params, snakemake.output
-files = list(zip(params.cells, snakemake.input.progress, snakemake.input.episodes, strict=True))
+given = snakemake.input
+files = list(zip(params.cells, given.progress, given.episodes, given.manifests, strict=True))
 
 with logged(snakemake.log[0]):
     blocks = (
         (
             cell,
-            read_table(unchanged(progress), block_schemas.PROGRESS),
-            read_table(unchanged(episodes), block_schemas.EPISODES),
+            read_table(unchanged(progress, manifest), block_schemas.PROGRESS),
+            read_table(unchanged(episodes, manifest), block_schemas.EPISODES),
         )
-        for cell, progress, episodes in files
+        for cell, progress, episodes, manifest in files
     )
     runs = runs_frame(blocks)
     progress = pd.concat(
-        [read_table(path, block_schemas.PROGRESS).assign(**cell) for cell, path, _ in files], ignore_index=True
+        [read_table(path, block_schemas.PROGRESS).assign(**cell) for cell, path, *_ in files], ignore_index=True
     )
     write_table(output.runs, runs, schemas.RUNS)
     write_table(output.cells, cells_frame(runs), schemas.CELLS)

@@ -22,7 +22,7 @@ evaluation = Evaluation.model_validate_json(params.evaluation)
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
-    trained = read_policy(unchanged(snakemake.input.policy))
+    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training))
     policy = Policy.from_weights(trained.weights, load_task(environment.task))
     frames = [
         evaluate(

@@ -16,7 +16,7 @@ params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
-    trained = read_policy(unchanged(snakemake.input.policy))
+    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training))
     long = evaluate_lengths(
         Policy.from_weights(trained.weights, load_task(environment.task)).act,
         trained.seeds,

@@ -21,4 +21,4 @@ with logged(snakemake.log[0]):
         "learning": paper_tables.learning(cells, runs),
     }
     for name, frame in frames.items():
-        paper_tables.save(frame, captions.caption(name, cells), Path("results/tables") / name)
+        paper_tables.save(frame, captions.caption(name, cells), Path(snakemake.output[0]).with_name(name))

@@ -15,4 +15,4 @@ with logged(snakemake.log[0]):
     tables = read_studies(path for path in given if "/experiments/" in path)[wildcards.experiment]
     tables = {**tables, "training_logs": pd.read_csv(given.training_logs)}
     figure = drawing.draw(wildcards.view, tables, drawing.STUDY)
-    save(figure, Path("figures") / f"{wildcards.experiment}_{wildcards.view}")
+    save(figure, Path(snakemake.output[0]).with_suffix(""))

@@ -20,4 +20,5 @@ with logged(snakemake.log[0]):
     }
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     for name in params.names:
-        save(draw(name, {**tables, "published": published, "radius": params.radius}), Path("figures") / name)
+        figure = draw(name, {**tables, "published": published, "radius": params.radius})
+        save(figure, Path(snakemake.output[0]).with_name(name))

@@ -13,7 +13,7 @@ params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake.log[0]):
-    trained = read_policy(unchanged(snakemake.input[0]))
+    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training))
     weights = {name: tensor[:1] for name, tensor in trained.weights.items()}
     first = Policy.from_weights(weights, load_task(environment.task))
     episode = video.evaluation_episode(

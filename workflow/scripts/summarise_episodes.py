@@ -12,8 +12,8 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
     episodes = (
-        (cell, read_table(unchanged(path), block_schemas.EPISODES))
-        for cell, path in zip(params.cells, given.episodes, strict=True)
+        (cell, read_table(unchanged(path, manifest), block_schemas.EPISODES))
+        for cell, path, manifest in zip(params.cells, given.episodes, given.manifests, strict=True)
     )
     radii = radius_frame(episodes)
     write_table(output.run_radii, radii, schemas.RUN_RADII)

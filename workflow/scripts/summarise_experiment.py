@@ -13,8 +13,8 @@ given, params, output = snakemake.input, snakemake.params, snakemake.output
 
 with logged(snakemake.log[0]):
     runs = read_table(given.runs, schemas.RUNS)
-    blocks = zip(params.cells, given.progress, strict=True)
-    parts = [read_table(unchanged(path), block_schemas.PROGRESS).assign(**cell) for cell, path in blocks]
+    blocks = zip(params.cells, given.progress, given.manifests, strict=True)
+    parts = [read_table(unchanged(*file), block_schemas.PROGRESS).assign(**cell) for cell, *file in blocks]
     progress = pd.concat(parts, ignore_index=True)
     write_table(output.logs, switch_effects.logs_frame(progress), schemas.LOGS)
     logged_curves = learning_curves.curve_table(progress, column="logged_return")

@@ -7,6 +7,7 @@ from pathlib import Path
 from job import logged
 
 from reacher_shaping.jobs import training_job
+from reacher_shaping.jobs.checkpoint_store import CheckpointStore
 from reacher_shaping.processor import kernels
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.storage import block_schemas
@@ -16,20 +17,23 @@ from reacher_shaping.storage.policy_format import weights_checksum, write_policy
 from reacher_shaping.storage.provenance import Record
 from reacher_shaping.tasks.base import load_task
 
+RADIUS = 0.02
+"""m, that counts as success in training unless the protocol says another: the paper's, whatever the evaluation's is."""
+
 record = Record()
 params, output = snakemake.params, snakemake.output
 cell = Cell.model_validate_json(params.cell)
 task = load_task(cell.protocol.environment.task)
 block = Path(output.policy).parent
-key = hashlib.sha256(
-    json.dumps([params.cell, params.seeds, params.radius, params.code, kernels()]).encode()
-).hexdigest()[:16]
-settings = {"cell": cell.settings(), "radius": params.radius}
+key = hashlib.sha256(json.dumps([params.cell, params.seeds, params.code, kernels()]).encode()).hexdigest()[:16]
+radius = cell.protocol.environment.radius(RADIUS)
+settings = {"cell": cell.settings(), "radius": radius}
 
 with logged(snakemake.log[0]) as say:
     checkpoints = Path("results/.checkpoints") / key
+    store = CheckpointStore(snakemake.resources.checkpoints.removeprefix("local"))
     with training_job.trained_block(
-        cell, params.seeds, radius=params.radius, folder=checkpoints, report=say, record=record
+        cell, params.seeds, radius=radius, folder=checkpoints, report=say, record=record, store=store
     ) as (state, _):
         weights = state.policy().weights()
         write_policy(output.policy, params.seeds, weights, settings)

@@ -36,8 +36,10 @@ def clean(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     return notebook
 
 
-def execute(source: Path, out: Path, parameters: dict[str, Any], log: Path | None = None) -> None:
-    """Execute the percent-format `source` with `parameters` and write the clean copy to `out`.
+def execute(
+    source: Path, out: Path, parameters: dict[str, Any], log: Path | None = None, working_folder: Path | None = None
+) -> None:
+    """Execute the percent-format `source` with `parameters` in a folder and write the clean copy to `out`.
 
     A notebook that fails is kept, with its traceback, at `log`; the exception goes on to the caller.
     """
@@ -46,7 +48,7 @@ def execute(source: Path, out: Path, parameters: dict[str, Any], log: Path | Non
         nbformat.write(jupytext.read(source), prepared)  # type: ignore[no-untyped-call]
         try:
             papermill.execute_notebook(
-                prepared, executed, parameters, log_output=False, progress_bar=False, cwd=Path.cwd()
+                prepared, executed, parameters, log_output=False, progress_bar=False, cwd=working_folder or Path.cwd()
             )
         finally:
             if log is not None and executed.exists():

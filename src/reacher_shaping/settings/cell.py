@@ -41,7 +41,7 @@ class Environment(Settings):
     reward: Literal["dense", "sparse"] = "dense"
     """Less the distance to the goal, or 1 within `success_radius` of it; both less the control cost."""
     success_radius: Positive | None = None
-    """Distance to the goal in m that counts as success; without it the evaluation's `radius`."""
+    """Distance to the goal in m that counts as success; without it 0.02 in training, else the evaluation's `radius`."""
     control_weight: NonNegative = 0.1
     """Reward taken per squared unit of action."""
     clip_actions: bool = False

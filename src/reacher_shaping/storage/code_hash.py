@@ -15,7 +15,8 @@ from pathlib import Path
 
 PACKAGE = "reacher_shaping"
 FOLDER = Path(__file__).parents[1]
-NEUTRAL = ("jobs.progress", "storage.provenance", "storage.code_hash")  # they tell of a result and never change one
+# Modules that tell of a result, or keep it, and never change one.
+NEUTRAL = ("jobs.progress", "jobs.checkpoint_store", "storage.provenance", "storage.code_hash")
 WHOLE = "*"  # in place of a definition's name: all definitions of its module
 Definition = tuple[str, str]  # (module, name)
 

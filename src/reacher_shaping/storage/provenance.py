@@ -49,26 +49,30 @@ def machine() -> dict[str, Any]:
     return {"cpu": _cpu(), "cores": len(os.sched_getaffinity(0)), "system": f"{platform.system()} {platform.release()}"}
 
 
-def recorded_checksum(path: Path | str) -> tuple[str, Path] | None:
-    """Return the checksum of a block's file by the manifest beside it, and that manifest; None if none tells.
+def recorded_checksum(path: Path | str, *manifests: Path | str) -> tuple[str, Path] | None:
+    """Return the checksum of a block's file by one of `manifests`, and that manifest; None if none tells.
+
+    Without manifests, those beside the file are asked.
 
     Raises ArtifactError for a manifest that cannot be read.
     """
     path = Path(path)
-    for manifest in (path.parent / "training.json", path.parent / "manifest.json"):
+    for manifest in map(Path, manifests or (path.parent / "training.json", path.parent / "manifest.json")):
         outputs = read_json(manifest).get("outputs") if manifest.exists() else None
         if isinstance(outputs, Mapping) and path.name in outputs:
             return str(outputs[path.name]), manifest
     return None
 
 
-def unchanged(path: Path | str) -> Path:
-    """Return the path of a block's file if its content is what its job wrote, by the checksum beside it.
+def unchanged(path: Path | str, manifest: Path | str | None = None) -> Path:
+    """Return the path of a block's file if its content is what its job wrote, by the checksum in the block's manifest.
+
+    manifest: the one to go by; without it, the one that lies beside the file.
 
     Raises ArtifactError that names the file that has changed, or the manifest that cannot tell.
     """
     path = Path(path)
-    recorded = recorded_checksum(path)
+    recorded = recorded_checksum(path, *([] if manifest is None else [manifest]))
     if recorded is None:
         raise ArtifactError(path.parent / "training.json", f"has no checksum of {path.name}")
     checksum, manifest = recorded

@@ -1,0 +1,54 @@
+# What a job asks of a cluster's queue: memory and run time, both growing with each attempt. One thread a job, always.
+# On one computer Snakemake reads none of it but the threads.
+from math import ceil
+
+from reacher_shaping.jobs import cost
+
+SLOW_STEPS_PER_SECOND = 10_000  # of training on an old or busy core, see benchmarks/results.md for measured rates
+SLOW_EVALUATION_STEPS_PER_SECOND = 20_000
+LATE_JOB_MINUTES = 5  # a job's start on a full node and disk
+
+
+def growing(amount):
+    """A resource that the first attempt gets once, the second twice, and so on."""
+    return lambda wildcards, attempt: amount * attempt
+
+
+def minutes(seconds):
+    """Run time in minutes for a job of so many seconds on a slow core."""
+    return LATE_JOB_MINUTES + ceil(seconds / 60)
+
+
+def training_minutes(wildcards, attempt):
+    """By the block's steps and the work of a step."""
+    ppo, seeds = CELLS[wildcards.cell].protocol.ppo, SEEDS[wildcards.block]
+    steps = CELLS[wildcards.cell].iterations * ppo.rollout_steps * len(seeds)
+    return attempt * minutes(steps * cost.work(ppo) / SLOW_STEPS_PER_SECOND)
+
+
+def evaluation_minutes(wildcards, attempt):
+    """By the block's evaluation episodes, the long ones counted with them."""
+    steps = 2 * cost.MODES * STUDY.evaluation.episodes * cost.EPISODE_STEPS * len(SEEDS[wildcards.block])
+    return attempt * minutes(steps / SLOW_EVALUATION_STEPS_PER_SECOND)
+
+
+# Jobs of seconds, not worth a place in a queue. Where Snakemake itself may not work on the login node, submit it as a job.
+localrules:
+    aggregate_runs,
+    aggregate_experiment,
+    correlate,
+    summarise_episodes,
+    compare_runs,
+    check_results,
+    judge_claims,
+    check_experiment,
+    summarise_experiment,
+    measure_effects,
+    compare_with_peers,
+    plot_experiment,
+    plot_figures,
+    format_tables,
+    gather_peers,
+    build_report,
+    build_reference_report,
+    build_crate,
