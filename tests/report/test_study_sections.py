@@ -184,3 +184,30 @@ def test_unknown_experiment_has_a_section_too(released):
     section = study_sections.section("my_study", released, LOGS)
     assert (section.title, section.intro) == ("My study", "")
     assert section.grids
+
+
+def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
+    row = {"id": "S1", "claim": "c", "a": "p l2 50", "b": "p none 1", "mean_a": 0.5, "mean_b": 0.01, "difference": 0.49}
+    row |= {"ci_low": 0.3, "ci_high": 0.6, "p_holm": 0.009, "solved_a": 0.8, "solved_b": 0.0, "verdict": "supported"}
+    table = pd.DataFrame([row, row | {"id": "S2", "verdict": "open"}])
+    grid = study_tables.hypotheses(table)
+    assert len(grid.headings) == len(grid.rows[0])
+    assert grid.rows[0][2:4] == ["p l2 50: 0.500", "p none 1: 0.010"]
+    assert [row[-1] for row in grid.rows] == ["supported", "open"]
+    assert "Of 2 hypotheses" in study_sections.hypotheses_sentence(table)
+
+
+def test_lengths_have_a_row_per_cell_and_length_with_every_interval():
+    row = {
+        "protocol": "tuned",
+        "variant": "none",
+        "budget": 1_000_000,
+        "alpha0": 1.0,
+        "mode": "stochastic",
+        "steps": 500,
+    }
+    for name in ("success_rate", "final_success_rate", "share_within_radius", "final_distance"):
+        row |= {name: 0.5, f"{name}_low": 0.4, f"{name}_high": 0.6}
+    (shown,) = (grid := study_tables.lengths(pd.DataFrame([row]))).rows
+    assert len(grid.headings) == len(shown)
+    assert shown[3:5] == ["500", "50.0 [40.0, 60.0]"]
