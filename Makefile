@@ -98,7 +98,7 @@ check: $(READY) ## ruff, snakefmt, mypy, snakemake --lint
 lock: $(READY) ## requirements.txt anew from the pins of pyproject.toml
 	uv pip compile --quiet pyproject.toml --output-file requirements.txt
 
-bench: $(READY) ## speed beside Stable-Baselines3 and the plain loop, into benchmarks/; leave the machine idle meanwhile
+bench: $(READY) ## speed beside its peers and the plain loop, into benchmarks/; leave the machine idle meanwhile
 	python benchmarks/run.py
 
 peers: $(READY) ## Stable-Baselines3 PPO, SAC and TD3 on the same task (hours), then the study with them in it

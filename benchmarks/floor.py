@@ -1,9 +1,13 @@
-"""The floor of the engine's time: its own `mj_step` calls and matrix products, alone on the same core."""
+"""The floor of the engine's time: its `mj_step` calls and matrix products at the best rate found for each."""
 
 import time
 from collections.abc import Callable
+from typing import Any
 
+import mujoco
+import mujoco.rollout
 import numpy as np
+import torch
 from side_by_side import Workload
 
 from reacher_shaping.settings.cell import PPO, Cell
@@ -11,6 +15,9 @@ from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training.network import Array
 from reacher_shaping.training.rollout import Collector, Plan
 from reacher_shaping.training.train import TrainState
+
+REPEATS = 10
+"""Times that each product is done to tell its time."""
 
 
 def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[Array, Array]]]]:
@@ -53,12 +60,14 @@ def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[Arr
 
 
 class Floor:
-    """An iteration's `mj_step` calls and matrix products and nothing else."""
+    """An iteration's `mj_step` calls and matrix products and nothing else, each as fast as this processor does it."""
 
     def __init__(self, cell: Cell, seeds: int) -> None:
         self.cell = cell
         self.seeds = range(seeds)
         self.plan = Plan(cell.protocol.ppo.rollout_steps, TASK.episode_steps)
+        model = TASK.simulated_model()
+        self.simulation = model, mujoco.MjData(model)
         self.collector = Collector(TASK, self.seeds, cell.root_seed, self.plan)
         self.products = [
             (times, [(a, b, np.empty((seeds, a.shape[1], b.shape[2]), np.float32)) for a, b in operands])
@@ -66,31 +75,29 @@ class Floor:
         ]
 
     def physics(self, state: TrainState) -> float:
-        """CPU seconds of the `mj_step` calls of the iteration that the engine does next.
+        """CPU seconds of the `mj_step` calls of the iteration that the engine does next, in C, on one hot simulation.
 
         The torques are the policy's own: an arm at its joint limit costs more, so random ones would not do.
         """
         lanes, iteration = self.collector.lanes, state.iteration
         action = self.collector.collect(state.policy(), iteration).action
-        action = action.reshape(lanes.count, self.plan.episode_steps, -1)
+        action = action.reshape(lanes.count, self.plan.episode_steps, -1).astype(np.float64)
         lanes.reset(self.collector.resets(iteration))
-        seconds = 0.0
-        for t in range(self.plan.episode_steps):
-            TASK.control(lanes.data, action[:, t])
-            begun = time.process_time()
-            lanes.batch.step(nstep=TASK.frame_skip)
-            seconds += time.process_time() - begun
+        model, data = self.simulation
+        start = lanes.batch.state[:, : mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)]
+        begun = time.process_time()
+        mujoco.rollout.rollout(model, data, start, action.repeat(TASK.frame_skip, axis=1))
+        seconds = time.process_time() - begun
         # The last lane of every seed is shorter than the time measured.
         return seconds * self.plan.steps / (self.plan.lanes * self.plan.episode_steps)
 
     def products_seconds(self) -> float:
-        """CPU seconds of an iteration's matrix products."""
-        begun = time.process_time()
-        for times, operands in self.products:
-            for _ in range(times):
-                for a, b, out in operands:
-                    np.matmul(a, b, out=out)
-        return time.process_time() - begun
+        """CPU seconds of an iteration's matrix products, each shape by the faster of NumPy and PyTorch."""
+        return sum(
+            times * min(seconds(np.matmul, *operands), seconds(torch.bmm, *map(torch.from_numpy, operands)))
+            for times, products in self.products
+            for operands in products
+        )
 
     def alone(self, share: Callable[[], float]) -> Workload:
         """Environment steps per second if the seconds of `share` were all that an iteration takes.
@@ -106,6 +113,14 @@ class Floor:
             return len(self.seeds) * self.plan.steps * whole / seconds
 
         return one
+
+
+def seconds(multiply: Callable, a: Any, b: Any, out: Any) -> float:
+    """CPU seconds of one product, out of a few."""
+    begun = time.process_time()
+    for _ in range(REPEATS):
+        multiply(a, b, out=out)
+    return (time.process_time() - begun) / REPEATS
 
 
 def fraction(engine: float, physics: float, products: float) -> float:

@@ -1,6 +1,8 @@
 """The measures as CSV, as Markdown and as a plot."""
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -9,15 +11,17 @@ import matplotlib
 import pandas as pd
 from matplotlib.figure import Figure
 from side_by_side import Measure, machine, versions
+from sizes import BLOCK
 
 from reacher_shaping.settings.study import load_study
 
-BLOCK = 10
-"""Seeds of the block whose rates the cost of a study is reckoned with."""
-
+HERE = Path(__file__).parent
 TITLES = {
+    "against": "Two checkouts in turns",
     "training": "Training, paper protocol",
-    "floor": "Training against its floor: its own mj_step calls and matrix products, alone",
+    "first call": "Until the first iteration is done: imports apart, compilation included",
+    "return": "Learning: mean return of five iterations (Stable-Baselines3 clips actions before they are charged)",
+    "floor": "Training against its floor: mj_step on one hot simulation in C, each matrix product at its best",
     "evaluation": "Evaluation, stochastic",
     "jobs": "A training job in a fresh process",
     "ladder": "What each idea brings",
@@ -36,6 +40,9 @@ def write(folder: Path, measures: Sequence[Measure], facts: Mapping[str, object]
     table.to_csv(folder / "results.csv", index=False, float_format="%.6g")
     (folder / "results.md").write_text(markdown(measures, facts), encoding="utf-8")
     draw(measures, folder / "results.svg")
+    if folder == HERE and any(row.name == "Stable-Baselines3" for row in measures):
+        page = HERE.parent / "README.md"
+        page.write_text(put_sentence(page.read_text(encoding="utf-8"), readme_sentence(table)), encoding="utf-8")
 
 
 def markdown(measures: Sequence[Measure], facts: Mapping[str, object]) -> str:
@@ -51,7 +58,7 @@ def markdown(measures: Sequence[Measure], facts: Mapping[str, object]) -> str:
         *([f"- {facts['note']}"] if facts["note"] else []),
         "",
     ]
-    for part, found in groupby(measures, key=lambda row: row.part):
+    for part, found in groupby(sorted(measures, key=lambda row: list(TITLES).index(row.part)), lambda row: row.part):
         lines += [f"## {TITLES[part]}", "", "| measure | value | range | unit | rounds | must | aim | reached |"]
         lines += ["|---|---:|---:|---|---:|---:|---:|---|"]
         for row in found:
@@ -64,11 +71,39 @@ def markdown(measures: Sequence[Measure], facts: Mapping[str, object]) -> str:
     return "\n".join(lines)
 
 
+def readme_sentence(table: pd.DataFrame) -> str:
+    """Return what the README says of speed, from the rows of results.csv."""
+    rows = table[table["part"] == "training"].set_index("name")["value"]
+    machine, base = table["machine"].iloc[0], rows["Stable-Baselines3"]
+    ten, native, one = (
+        rows[f"{name} kernels"] for name in ("10 seeds, portable", "10 seeds, native", "1 seed, portable")
+    )
+    text = (
+        f"Speed, on one core of this machine: {machine}. Ten seeds of the `paper` protocol train at {ten:,.0f} "
+        f"environment steps/s, {ten / base:.0f} times Stable-Baselines3's PPO ({native:,.0f} with `kernels=native`), "
+        f"one seed at {one:,.0f}. "
+    )
+    if "JAX, 10 seeds" in rows:
+        jax, jax_one = rows["JAX, 10 seeds"], rows["JAX, 1 seed"]
+        text += (
+            f"The fastest peer, PPO compiled by JAX with the arm in closed form instead of MuJoCo, trains ten seeds at "
+            f"{jax:,.0f} and one at {jax_one:,.0f}. "
+        )
+    return text + "All peers: [benchmarks/results.md](benchmarks/results.md)."
+
+
+def put_sentence(page: str, sentence: str) -> str:
+    """Return a page with the sentence between its marks."""
+    return re.sub(
+        r"(<!-- speed: begin -->\n).*(<!-- speed: end -->)", rf"\g<1>{sentence}\n\g<2>", page, flags=re.DOTALL
+    )
+
+
 def cost_table(measures: Sequence[Measure]) -> list[str]:
     """Return what studies take at the rates measured, as Markdown; nothing unless all that it needs was measured."""
     found = {(row.part, row.name): row.value for row in measures}
     names = [
-        ("training", f"{BLOCK} seeds"),
+        ("training", f"{BLOCK} seeds, portable kernels"),
         ("evaluation", f"{BLOCK} policies"),
         ("jobs", f"job of {BLOCK} seeds, CPU time of the start"),
     ]
@@ -106,16 +141,18 @@ def number(value: float) -> str:
 
 
 def draw(measures: Sequence[Measure], path: Path) -> None:
-    """Draw the ladder and the cost of blocks, as far as they were measured."""
-    panels = [
-        (part, label, found)
-        for part, label in (
-            ("ladder", "steps/s over the plain loop"),
-            ("seeds per block", "steps/s over the default block"),
-            ("budget", "time over the shortest run"),
-        )
-        if (found := [row for row in measures if row.part == part])
-    ]
+    """Draw the peers, the ladder and the cost of blocks, as far as they were measured."""
+    rates = [row for row in measures if row.part == "training" and row.unit == "steps/s"]
+    base = next((row.value for row in rates if row.name == "Stable-Baselines3"), 1.0)
+    over = [replace(row, value=row.value / base, low=row.low / base, high=row.high / base) for row in rates]
+    parts = {part: [row for row in measures if row.part == part] for part in TITLES} | {"training": over}
+    labels = {
+        "training": "steps/s over Stable-Baselines3's",
+        "ladder": "steps/s over the plain loop",
+        "seeds per block": "steps/s over the default block",
+        "budget": "time over the shortest run",
+    }
+    panels = [(part, label, parts[part]) for part, label in labels.items() if parts[part]]
     with matplotlib.rc_context({"svg.hashsalt": "benchmarks", "svg.fonttype": "none", "font.size": 9}):
         figure = Figure(figsize=(4 * max(1, len(panels)), 3), layout="constrained")
         for number_, (part, label, found) in enumerate(panels):
@@ -128,7 +165,8 @@ def draw(measures: Sequence[Measure], path: Path) -> None:
             axes.invert_yaxis()
             axes.set_xlabel(label)
             axes.set_title(TITLES[part], fontsize=9)
-            for position, value in enumerate(values):
-                axes.annotate(f"{value:.2g}", (0, position), xytext=(3, 0), textcoords="offset points",
-                              va="center", color="white", fontsize=8)  # fmt: skip
+            axes.margins(x=0.15)
+            for position, row in enumerate(found):
+                axes.annotate(f"{row.value:.2g}", (row.high, position), xytext=(4, 0), textcoords="offset points",
+                              va="center", fontsize=8)  # fmt: skip
         figure.savefig(path, metadata={"Date": None})

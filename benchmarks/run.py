@@ -1,8 +1,10 @@
 """Measure the engine against its peers and its floor, side by side on one pinned core.
 
     python benchmarks/run.py [--quick] [--part PART ...] [--repeats N] [--out FOLDER]
+    python benchmarks/run.py --against CHECKOUT      # before and after a change
 
-Writes results.csv, results.md and results.svg into FOLDER (default: this folder; with --quick: build/benchmarks).
+Writes results.csv, results.md and results.svg into FOLDER (default: this folder; with --quick or --against:
+build/benchmarks). JAX, brax, EnvPool and sbx are measured where they are installed: pip install -e .[bench]
 """
 
 # ruff: noqa: E402 (the environment of a job and the path of the plain loop must be set before the imports)
@@ -31,7 +33,8 @@ import peers
 from floor import Floor, fraction
 from ladder import RADIUS, engine, rungs
 from present import write
-from side_by_side import Measure, Workload, measure, pin, ratios, take_turns
+from side_by_side import Measure, Worker, Workload, measure, pin, ratios, take_turns
+from sizes import BLOCK, QUICK_SIZE, Size
 
 from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, evaluate
 from reacher_shaping.jobs import training_job
@@ -45,37 +48,6 @@ from reacher_shaping.training.train import TrainState
 
 TRAINED_LOG_STD = -2.2
 """Policies are evaluated with the spread that training leaves, 0.11; a wide one keeps the arm at its joint limit."""
-BLOCK = 10
-"""Seeds of the block that the measures are stated for."""
-
-
-@dataclass(frozen=True)
-class Size:
-    """How much is measured: all, or just enough to see that it runs."""
-
-    repeats: int = 5
-    seeds: tuple[int, ...] = (1, 2, 5, BLOCK, 20, 40)
-    budgets: tuple[int, ...] = (1, 2, 4)  # iterations
-    chunks: int = 20  # of LANES_PER_SEED episodes: the 1000 of the study
-    blocks: tuple[int, ...] = (1, 10, 100)  # per cell, for the dry run
-    floor_begins: tuple[int, ...] = (0, 60)  # iterations before the floor is measured
-    job_iterations: int = 3
-    quick: bool = False
-
-    @property
-    def block(self) -> int:
-        return BLOCK if BLOCK in self.seeds else self.seeds[-1]
-
-    def cell(self, iterations: int = 10_000) -> Cell:
-        """The first cell of the study with as many iterations as are asked for; small rollouts when quick."""
-        cell = load_study(HERE.parent / "config.yaml").cells[0].model_dump()
-        if self.quick:
-            cell["protocol"]["ppo"] |= {"rollout_steps": 128, "epochs": 1}
-        cell["budget"] = iterations * cell["protocol"]["ppo"]["rollout_steps"]
-        return Cell.model_validate(cell)
-
-
-QUICK = Size(repeats=1, seeds=(1, 2), budgets=(1, 2), chunks=1, blocks=(1,), floor_begins=(0, 3), quick=True)
 
 
 @dataclass
@@ -99,23 +71,62 @@ def training(cell: Cell, seeds: int) -> Training:
     return Training(engine(cell, range(seeds)), seeds * cell.protocol.ppo.rollout_steps)
 
 
+CONTENDERS = {
+    "Stable-Baselines3": ("stable_baselines", 1),
+    "Stable-Baselines3, shared trunk": ("shared_trunk", 1),
+    "EnvPool + Stable-Baselines3": ("envpool", 1),
+    "sbx": ("sbx", 1),
+    "JAX, 10 seeds": ("jax", BLOCK),
+    "JAX, 1 seed": ("jax", 1),
+    "JAX on brax spring, 10 seeds": ("brax", BLOCK),
+}
+"""Peers by the name they are shown with: their name in worker.py, and seeds."""
+
+
 def measure_training(size: Size) -> Iterator[Measure]:
-    """Training against Stable-Baselines3's PPO with the same hyperparameters."""
-    cell, part = size.cell(), "training"
-    names = {"engine": size.block, "engine of one": 1}
-    workloads: dict[str, Workload] = {name: training(cell, seeds) for name, seeds in names.items()}
-    workloads["peer"] = peers.stable_baselines(cell, shared=False)
-    workloads["peer, shared trunk"] = peers.stable_baselines(cell, shared=True)
-    rates = take_turns(workloads, size.repeats)
-    for name, seeds in names.items():
-        must, aim = (13, 18) if seeds > 1 else (5, 8)
-        ratio = ratios(rates[name], rates["peer"])
-        yield measure(part, f"{named(seeds)} / Stable-Baselines3", ratio, "x", must=must, aim=aim)
-        ratio = ratios(rates[name], rates["peer, shared trunk"])
-        yield measure(part, f"{named(seeds)} / Stable-Baselines3 with the shared trunk", ratio, "x")
-        yield measure(part, named(seeds), rates[name], "steps/s")
-    for name in ("peer", "peer, shared trunk"):
-        yield measure(part, name.replace("peer", "Stable-Baselines3"), rates[name], "steps/s")
+    """Training against its peers, each in a process of its own with its fastest kernels; the engine also with those.
+
+    A peer that is not installed is left out. Stable-Baselines3 and what is built on it know one run a process.
+    """
+    part = "training"
+    workers = {}
+    for seeds in (size.block, 1):
+        for kernels in processor.KERNELS:
+            workers[f"{named(seeds)}, {kernels} kernels"] = Worker("engine", seeds, kernels, size.quick)
+    for label, (name, seeds) in CONTENDERS.items():
+        try:
+            workers[label] = Worker(name, min(seeds, size.block), "native", size.quick)
+        except ImportError as error:
+            print(f"{label} is left out: {error}")
+    rates = take_turns(workers, size.repeats)
+    for seeds in (size.block, 1):
+        for kernels in processor.KERNELS:
+            name = f"{named(seeds)}, {kernels} kernels"
+            for peer in ("Stable-Baselines3", f"JAX, {named(seeds)}"):
+                targets = {"must": 13 if seeds > 1 else 5, "aim": 18 if seeds > 1 else 8} if "Base" in peer else {}
+                if peer in rates:
+                    yield measure(part, f"{name} / {peer}", ratios(rates[name], rates[peer]), "x", **targets)
+    for name, values in rates.items():
+        yield measure(part, name, values, "steps/s")
+    for name, worker in workers.items():
+        yield measure("first call", name, [worker.first_seconds], "s")
+        while len(worker.returns) < size.curve[-1]:
+            worker()
+        for iteration in size.curve:
+            steps = iteration * size.cell().protocol.ppo.rollout_steps
+            yield measure("return", f"{name}, {steps:,} steps a run", worker.returns[:iteration][-5:], "per episode")
+        worker.end()
+
+
+def measure_against(size: Size, other: Path) -> Iterator[Measure]:
+    """Training of this checkout against that of another, with portable kernels."""
+    for seeds in (size.block, 1):
+        checkouts = {"this": HERE.parent, "other": other}
+        workers = {name: Worker("engine", seeds, "portable", size.quick, root) for name, root in checkouts.items()}
+        rates = take_turns(workers, size.repeats)
+        yield measure("against", f"{named(seeds)}, this checkout / {other}", ratios(rates["this"], rates["other"]), "x")
+        for worker in workers.values():
+            worker.end()
 
 
 def named(seeds: int) -> str:
@@ -123,27 +134,20 @@ def named(seeds: int) -> str:
 
 
 def measure_floor(size: Size) -> Iterator[Measure]:
-    """The engine's time against its own `mj_step` calls and matrix products, early in training and later.
-
-    `mj_step` is timed as the engine runs it, with its profiling clock off. As installed the clock is on, and the call
-    takes so much longer that the engine's whole time is not far above it; that reading has no target.
-    """
+    """The engine's time against its `mj_step` calls and matrix products at their best, early in training and later."""
     cell = size.cell()
     for seeds in (size.block, 1):
         engine, floor = training(cell, seeds), Floor(cell, seeds)
         targets = {"must": 0.6, "aim": 0.8} if seeds > 1 else {}
         physics = floor.alone(partial(physics_seconds, floor, engine))
         workloads = {"engine": engine, "physics": physics, "products": floor.alone(floor.products_seconds)}
-        workloads["as installed"] = peers.as_installed()(physics)
         for begun in size.floor_begins:
             while engine.done < begun:
                 engine()
             rates = take_turns(workloads, size.repeats)
             label = f"{named(seeds)} from iteration {begun + 1} on"
-            for kind, text in (("physics", ""), ("as installed", ", mj_step as installed")):
-                values = list(map(fraction, rates["engine"], rates[kind], rates["products"]))
-                aims = targets if kind == "physics" else {}
-                yield measure("floor", f"{label}, fraction of the floor{text}", values, "of 1", **aims)
+            values = list(map(fraction, rates["engine"], rates["physics"], rates["products"]))
+            yield measure("floor", f"{label}, fraction of the floor", values, "of 1", **targets)
             share = ratios(rates["engine"], rates["physics"])
             yield measure("floor", f"{label}, share of mj_step calls", share, "of 1")
 
@@ -310,18 +314,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="tiny workloads: shows that it runs, measures nothing")
     parser.add_argument("--part", action="append", choices=PARTS, help="only this part; may be given again")
+    parser.add_argument("--against", type=Path, metavar="CHECKOUT", help="only: this checkout and another in turns")
     parser.add_argument("--repeats", type=int, help="rounds per part, after one to warm up")
     parser.add_argument("--out", type=Path, help="folder of the results")
     parser.add_argument("--note", default="", help="a sentence on the circumstances, for the head of the table")
     options = parser.parse_args()
-    size = QUICK if options.quick else Size()
+    if options.part and options.against:
+        parser.error("--against measures one part of its own; give no --part with it")
+    size = QUICK_SIZE if options.quick else Size()
     if options.repeats is not None:
         size = Size(**{**vars(size), "repeats": max(1, options.repeats)})
-    out = options.out or (HERE.parent / "build" / "benchmarks" if options.quick else HERE)
+    out = options.out or (HERE.parent / "build" / "benchmarks" if options.quick or options.against else HERE)
     core = pin()
     load, begun, measures = os.getloadavg()[0], time.time(), []
-    for part in options.part or PARTS:
-        for found in PARTS[part](size):
+    parts = {"against": partial(measure_against, other=options.against.resolve())} if options.against else PARTS
+    for part in options.part or parts:
+        for found in parts[part](size):
             measures.append(found)
             print(f"{found.part:16s} {found.name:52s} {found.value:10.3f} {found.unit}", flush=True)
         facts = {"core": core, "load": load, "minutes": (time.time() - begun) / 60, "note": options.note}

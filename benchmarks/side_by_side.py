@@ -4,16 +4,24 @@ Every round runs every workload once, in the same order (A B A B ...), and ratio
 CPU time of this single-threaded process, which is wall time on an idle core and does not count other people's work.
 """
 
+import json
 import os
 import platform
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from importlib.metadata import distributions, version
 from pathlib import Path
 
-PACKAGES = ("torch", "mujoco", "gymnasium", "stable-baselines3", "numpy", "snakemake")
+PACKAGES = (
+    "torch", "mujoco", "gymnasium", "stable-baselines3", "numpy", "snakemake", "jax", "brax", "envpool", "sbx-rl",
+)  # fmt: skip
+
+CHECKOUT = Path(__file__).resolve().parents[1]
 
 Workload = Callable[[], float]
 """Does a share of work and returns how many units (mostly environment steps) it was."""
@@ -54,6 +62,50 @@ def pin() -> int:
     return core
 
 
+class Worker:
+    """A workload in a process of its own, pinned with this one: see worker.py.
+
+    Attributes:
+        first_seconds: CPU seconds from its construction to the end of its first iteration, compilation included.
+        returns: mean return of each iteration's episodes, of all its seeds.
+        seconds: CPU seconds of the last iteration, its own count.
+    """
+
+    def __init__(self, name: str, seeds: int, kernels: str, quick: bool, checkout: Path = CHECKOUT) -> None:
+        """Start it, of this checkout or another, and wait for its first iteration.
+
+        Raises ImportError if it lacks a package, RuntimeError if it ends for another reason.
+        """
+        command = [sys.executable, str(checkout / "benchmarks" / "worker.py"), name, str(seeds), kernels]
+        self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115  # it lives as long as the process
+        self._process = subprocess.Popen(
+            [*command, "quick" if quick else "whole"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True,
+            env=os.environ | {"PYTHONPATH": str(checkout / "src")},
+        )  # fmt: skip
+        first = self._made()
+        self.first_seconds, self.seconds, self.returns = first["seconds"], 0.0, [first["episode_return"]]
+
+    def __call__(self) -> float:
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        made = self._made()
+        self.seconds = made["seconds"]
+        self.returns.append(made["episode_return"])
+        return made["units"]
+
+    def _made(self) -> dict[str, float]:
+        line = self._process.stdout.readline()
+        if not line:
+            self._errors.seek(0)
+            problem = self._errors.read().strip().splitlines()[-1]
+            raise (ImportError if problem.startswith("ModuleNotFoundError") else RuntimeError)(problem)
+        return json.loads(line)
+
+    def end(self) -> None:
+        self._process.communicate()
+
+
 def take_turns(workloads: Mapping[str, Workload], repeats: int) -> dict[str, list[float]]:
     """Return units per CPU second, a value a round, after a round to warm up."""
     rates: dict[str, list[float]] = {name: [] for name in workloads}
@@ -61,8 +113,9 @@ def take_turns(workloads: Mapping[str, Workload], repeats: int) -> dict[str, lis
         for name, work in workloads.items():
             begun = time.process_time()
             units = work()
+            seconds = work.seconds if isinstance(work, Worker) else time.process_time() - begun
             if turn:
-                rates[name].append(units / (time.process_time() - begun))
+                rates[name].append(units / seconds)
     return rates
 
 
@@ -85,5 +138,7 @@ def machine() -> str:
 
 
 def versions() -> str:
-    """Return the versions that decide speed."""
-    return ", ".join([f"Python {platform.python_version()}", *(f"{name} {version(name)}" for name in PACKAGES)])
+    """Return the versions that decide speed, of the packages that are there."""
+    installed = {distribution.name.lower().replace("_", "-") for distribution in distributions()}
+    there = (f"{name} {version(name)}" for name in PACKAGES if name in installed)
+    return ", ".join([f"Python {platform.python_version()}", *there])

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-WRITTEN = re.sub(r"<!-- reference: begin -->.*<!-- reference: end -->", "", README, flags=re.DOTALL)
+WRITTEN = re.sub(r"<!-- (reference|speed): begin -->.*?<!-- \1: end -->", "", README, flags=re.DOTALL)
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 

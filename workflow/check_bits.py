@@ -5,6 +5,7 @@ python workflow/check_bits.py [bits.json]
 
 import json
 import sys
+import tempfile
 from pathlib import Path
 
 from reacher_shaping import processor
@@ -26,8 +27,13 @@ def main() -> int:
     cell = Cell.model_validate_json(json.dumps(published["settings"]["cell"]))
     seeds, radius = published["seeds"], published["settings"]["radius"]
     print(f"{cell.name}, seeds {seeds}, on {machine()['cpu']} with the kernels of {processor.core_type()}", flush=True)
-    folder = Path("build/check-bits")
-    with training_job.trained_block(cell, seeds, radius=radius, folder=folder, report=print) as (state, _):
+    with (
+        tempfile.TemporaryDirectory() as folder,  # nothing that an earlier training left may be taken over
+        training_job.trained_block(cell, seeds, radius=radius, folder=Path(folder) / "block", report=print) as (
+            state,
+            _,
+        ),
+    ):
         found = weights_checksum(state.policy().weights())
     if found == published["weights"]:
         print(f"equal: the weights have the published checksum, {found}")

@@ -4,12 +4,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mujoco.rollout
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 from cells import small
 from mujoco.batch import Batch
+
+from reacher_shaping.tasks.base import Lanes
+from reacher_shaping.tasks.reacher import TASK
 
 pytestmark = pytest.mark.slow
 
@@ -69,19 +73,34 @@ def test_the_floor_steps_as_the_engine_does_in_its_next_iteration(monkeypatch):
     of = small("l2", iterations=2)
     iterator = ladder.engine(of, [0, 1, 2])
     floor_of_three, state = floor.Floor(of, 3), next(iterator)
-    step, stepped = Batch.step, []
+    step, stepped, rollout, made = Batch.step, [], mujoco.rollout.rollout, []
 
     def recording(batch, **count):
-        stepped.append(batch.state.copy())
+        stepped.append(batch.state[:, 1:5].copy())  # positions and velocities
         step(batch, **count)
 
+    monkeypatch.setattr(mujoco.rollout, "rollout", lambda *given: made.append(rollout(*given)[0]))
+    floor_of_three.physics(state)
     monkeypatch.setattr(Batch, "step", recording)
-    floor_of_three.physics(state)  # collects, then steps again
-    collected, replayed = np.split(np.array(stepped), 2)
-    stepped.clear()
     next(iterator)
-    assert np.array_equal(replayed, stepped)
-    assert np.array_equal(collected, stepped)
+    after_each_step = made[0][:, 1::2, 1:5].swapaxes(0, 1)
+    assert np.array_equal(after_each_step[:-1], stepped[1:])
+
+
+def test_the_arm_of_the_compiled_peer_is_gymnasiums():
+    jax = pytest.importorskip("jax", reason="the compiled peer is an extra: pip install -e .[bench]")
+    import jax_ppo
+
+    rng, lanes = np.random.default_rng(0), Lanes(TASK, 40)
+    draws = np.array([TASK.draw_reset(rng) for _ in range(lanes.count)])
+    lanes.reset(draws)
+    angle, velocity, step = draws[:, :2], draws[:, 4:6], jax.jit(jax.vmap(jax_ppo.arm_step))
+    for _ in range(TASK.episode_steps):
+        torque = rng.normal(0, 1.5, (lanes.count, 2))
+        lanes.step(torque)
+        angle, velocity, tip = step(angle, velocity, torque)
+        np.testing.assert_allclose(tip - draws[:, 2:4], lanes.observation[:, 8:10], rtol=0, atol=1e-6)
+    assert (np.abs(np.asarray(angle)[:, 1]) > jax_ppo.LIMIT).any(), "the elbow must reach its limit somewhere"
 
 
 def test_the_fraction_of_the_floor():
@@ -100,12 +119,23 @@ def test_what_prepares_a_share_of_the_floor_does_not_count(monkeypatch):
     assert steps / 4.0 == 3 * of.plan.steps / 1.0
 
 
+def test_readme_says_what_was_measured():
+    import present
+
+    page = (BENCHMARKS.parent / "README.md").read_text()
+    sentence = present.readme_sentence(pd.read_csv(BENCHMARKS / "results.csv"))
+    assert sentence in page
+    assert present.put_sentence(page, "Fast.") == page.replace(sentence, "Fast.")
+
+
 def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
     command = [sys.executable, str(BENCHMARKS / "run.py"), "--quick", "--out", str(tmp_path)]
     subprocess.run(command, check=True, capture_output=True)
     table = pd.read_csv(tmp_path / "results.csv")
     parts = {
         "training",
+        "first call",
+        "return",
         "floor",
         "evaluation",
         "jobs",
@@ -116,13 +146,21 @@ def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
         "workflow",
     }
     assert set(table["part"]) == parts
-    assert (table["value"] > 0).all()
+    assert (table["value"][table["part"] != "return"] > 0).all()
     assert ((table["low"] <= table["value"]) & (table["value"] <= table["high"])).all()
     assert table[["machine", "threads", "versions", "repeats"]].notna().all(axis=None)
-    assert table["must"].notna().sum() == 9
+    assert table["must"].notna().sum() == 11
     text = (tmp_path / "results.md").read_text()
     assert all(name in text for name in table["name"])
     assert "<svg" in (tmp_path / "results.svg").read_text()
+
+
+def test_a_checkout_is_measured_against_another(tmp_path):
+    given = ["--quick", "--against", str(BENCHMARKS.parent), "--out", str(tmp_path)]
+    subprocess.run([sys.executable, str(BENCHMARKS / "run.py"), *given], check=True, capture_output=True)
+    table = pd.read_csv(tmp_path / "results.csv")
+    assert list(table["part"]) == ["against"] * 2
+    assert (table["value"] > 0).all()
 
 
 def test_cost_of_a_study_is_the_sum_over_its_blocks():

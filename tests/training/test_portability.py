@@ -28,7 +28,8 @@ from reacher_shaping.storage.policy_format import write_policy
 path = Path(sys.argv[1])
 for variant, changes in (("l2", {}), ("decay", {"networks": "separate", "initialisation": "orthogonal"})):
     cell = small(variant, iterations=2, **changes)
-    with training_job.trained_block(cell, [0, 1], radius=0.02, folder=path / "checkpoint", report=print) as (state, _):
+    block = path / f"{variant}-block"
+    with training_job.trained_block(cell, [0, 1], radius=0.02, folder=block, report=print) as (state, _):
         policy = state.policy()
         write_policy(path / f"{variant}.pt", state.seeds, policy.weights(), {})
         state.progress_frame().to_parquet(path / f"{variant}-progress.parquet")
@@ -49,7 +50,7 @@ def job(folder: Path, *, kernels: str = "portable", cpu: str = "", **variables: 
     command = [*emulator, os.path.realpath(sys.executable), "-W", "ignore", "-c", JOB, str(folder), kernels]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)} | variables
     subprocess.run(command, env=environment, check=True, timeout=1800)
-    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.is_file()}
 
 
 @pytest.fixture(scope="module")
