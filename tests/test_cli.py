@@ -1,6 +1,9 @@
 import io
 import os
 import pickle
+import subprocess
+import sys
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -207,6 +210,79 @@ def test_play_without_display_says_what_to_do(ours, capsys, monkeypatch):
         monkeypatch.delenv(name, raising=False)
     assert cli.main(["play", str(ours)]) == 1
     assert "--record" in capsys.readouterr().err
+
+
+def test_display_that_is_gone_says_what_to_do(released):
+    """In a process of its own: what is wrong ends it by an assertion of C."""
+    environment = os.environ | {"DISPLAY": ":987"}
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-m", "reacher_shaping.cli", "play", str(released)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    said = "no display: :987 cannot be opened; record a file instead (--record FILE.gif)"
+    assert done.stderr == f"reacher-shaping: error: {said}\n"
+
+
+WRITES = {"evaluate": ["--episodes", "1", "--out"], "play": ["--record"]}
+
+
+@pytest.mark.parametrize("command", WRITES)
+def test_what_a_command_reads_it_never_writes(command, ours, tmp_path, capsys):
+    """Under another name as little as under its own, and as little with --force."""
+    policy = tmp_path / "policy.gif"
+    ours.rename(policy)
+    (tmp_path / "link.gif").symlink_to(policy)
+    (tmp_path / "hard.gif").hardlink_to(policy)
+    before = policy.read_bytes()
+    for name in ("policy.gif", "link.gif", "hard.gif"):
+        for force in ([], ["--force"]):
+            assert cli.main([command, str(policy), *WRITES[command], str(tmp_path / name), *force]) == 1
+            assert f"{name}: is read by this command; give another name" in capsys.readouterr().err
+    assert policy.read_bytes() == before
+
+
+@pytest.mark.parametrize("command", WRITES)
+def test_file_that_is_there_is_replaced_only_with_force(command, ours, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("reacher_shaping.evaluation.video.find_opengl", lambda: None)
+    there = tmp_path / "there.gif"
+    there.write_text("mine")
+    arguments = [command, str(ours), *WRITES[command], str(there)]
+    assert cli.main(arguments) == 1
+    assert "there.gif: is there already; give another name, or --force" in capsys.readouterr().err
+    assert there.read_text() == "mine"
+    assert cli.main([*arguments, "--force"]) == 0
+    assert there.read_bytes() != b"mine"
+
+
+@pytest.mark.parametrize("command", WRITES)
+def test_place_that_cannot_be_written_is_refused_before_the_work(command, ours, tmp_path, capsys, monkeypatch):
+    def work(*arguments, **options):
+        raise AssertionError("it began to work")
+
+    monkeypatch.setattr("reacher_shaping.evaluation.evaluate.evaluate", work)
+    monkeypatch.setattr("reacher_shaping.evaluation.video.evaluation_episode", work)
+    (tmp_path / "file").touch()
+    for place in (tmp_path / "file/a.gif", Path("/proc/none/a.gif"), tmp_path / f"{'a' * 300}.gif"):
+        assert cli.main([command, str(ours), *WRITES[command], str(place)]) == 1
+        assert str(place) in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["a.GIF", "a.Mp4", f"{'a' * 251}.gif"])
+def test_kind_of_video_is_known_in_any_case_and_length_of_name(name, ours, tmp_path, monkeypatch):
+    monkeypatch.setattr("reacher_shaping.evaluation.video.find_opengl", lambda: None)
+    assert cli.main(["play", str(ours), "--record", str(tmp_path / name)]) == 0
+    assert (tmp_path / name).stat().st_size > 1000
+
+
+def test_name_of_a_file_is_no_formula_in_the_table(released, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("=cmd", "+1", "@a"):
+        released.rename(name)
+        assert cli.main(["evaluate", name, "--episodes", "1"]) == 0
+        [run] = table(capsys)["run"]
+        assert run == f"./{name}"
+        assert Path(run).exists()
+        Path(name).rename(released)
 
 
 def test_version_is_the_packages(capsys):

@@ -2,7 +2,8 @@
 
     python workflow/archive.py [FOLDER [ZIP]]
 
-The zip holds the files that the study's crate lists and the crate's metadata; the same files give the same bytes.
+The zip holds the files that the study's crate lists, the crate's metadata and the seals that the jobs left beside the
+files; the same files give the same bytes.
 Ends with 1, and packs nothing, if a file is missing or has another content than the crate says.
 """
 
@@ -13,7 +14,7 @@ from pathlib import Path
 from verify import crate_problems
 
 from reacher_shaping.storage.crate import METADATA, checksums
-from reacher_shaping.storage.files import ArtifactError, replacing
+from reacher_shaping.storage.files import ArtifactError, replacing, seal_of
 
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # of a zip's time stamps; the files' own would differ from copy to copy
 
@@ -22,7 +23,8 @@ def pack(folder: Path, archive: Path) -> int:
     """Write the zip; return how many files it holds."""
     names = [METADATA, *sorted(checksums(folder / METADATA))]
     with replacing(archive) as temporary, zipfile.ZipFile(temporary, "w") as packed:
-        for name in names:
+        seals = [str(seal) for seal in map(seal_of, names) if (folder / seal).exists()]
+        for name in [*names, *seals]:
             entry = zipfile.ZipInfo(name, EARLIEST)
             entry.external_attr = 0o644 << 16
             packed.writestr(entry, (folder / name).read_bytes(), zipfile.ZIP_DEFLATED, compresslevel=6)

@@ -27,7 +27,7 @@ from reacher_shaping.jobs.regroup import Part
 from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.study import Study
 from reacher_shaping.storage.crate import METADATA, checksums
-from reacher_shaping.storage.files import ArtifactError, read_json
+from reacher_shaping.storage.files import ArtifactError, read_json, seal_of
 
 KEPT = ("done", "trained")
 
@@ -54,6 +54,7 @@ def opened(source: Path) -> Iterator[Path]:
             raise ArtifactError(source, f"holds no {METADATA}", "give an archive of `make archive`")
         problems = [problem.split("; ")[0].replace(f"{folder}/", "") for problem in crate_problems(folder)]
         listed = {METADATA, *checksums(folder / METADATA)} if not problems else set()
+        listed |= {str(seal_of(name)) for name in listed}
         foreign = [path for path in map(str, files(folder)) if path not in listed]
         if problems or foreign:
             told = problems[0] if problems else f"{foreign[0]}: is not in its list of files"
@@ -112,6 +113,7 @@ def take(block: Block, found: list[Part], settings: Study, codes: Codes, folder:
     into = folder / block.folder
     if whole:
         names = [*whole[0].record["outputs"], "training.json", "manifest.json"]
+        shutil.rmtree(into / ".checksums", ignore_errors=True)  # of files that were here before
         for name in names:
             (into / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(whole[0].folder / name, into / name)

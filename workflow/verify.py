@@ -6,11 +6,13 @@ Ends with 1 if a file is missing or has another content than when it was made.
 """
 
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 from reacher_shaping.storage.crate import METADATA, checksums
-from reacher_shaping.storage.files import ArtifactError, read_json, sha256
+from reacher_shaping.storage.files import ArtifactError
+from reacher_shaping.storage.provenance import changed_outputs, differing
+
+MADE = ("results", "figures", "report")  # folders of what the jobs make
 
 
 def blocks(folder: Path) -> list[Path]:
@@ -21,38 +23,33 @@ def blocks(folder: Path) -> list[Path]:
 
 
 def block_problems(folder: Path) -> list[str]:
-    """One line per file that is not what its block's manifest says, or per manifest that is missing or damaged."""
-    found = []
+    """One line per file that is not what its block's manifests say, or per manifest that is missing or damaged."""
+    found: list[str] = []
     for block in blocks(folder):
-        path = block / "manifest.json"
-        try:
-            outputs = read_json(path).get("outputs") if path.exists() else {path.name: ""}
-            if not isinstance(outputs, Mapping):
-                raise ArtifactError(path, "holds no outputs")
-            found += differing(block, outputs)
-        except ArtifactError as error:
-            found.append(str(error))
+        long = block / "long_episodes.json"
+        for path in [block / "manifest.json", *([long] if long.exists() else [])]:
+            try:
+                found += changed_outputs(path) if path.exists() else differing(block, {path.name: ""})
+            except ArtifactError as error:
+                found.append(str(error))
+    return found
+
+
+def seal_problems(folder: Path) -> list[str]:
+    """The same for the files that are sealed by the jobs that made them: tables, figures, notebooks, videos, report."""
+    found: list[str] = []
+    for seal in (seal for part in MADE for seal in sorted(folder.glob(f"{part}/**/.checksums/*"))):
+        file = seal.parent.parent / seal.name
+        found += differing(file.parent, {file.name: seal.read_text(errors="replace").strip()} if file.exists() else {})
     return found
 
 
 def crate_problems(folder: Path) -> list[str]:
     """The same for the files that the study's crate lists."""
     try:
-        return differing(folder, checksums(folder / METADATA))
+        return list(differing(folder, checksums(folder / METADATA)))
     except ArtifactError as error:
         return [str(error)]
-
-
-def differing(folder: Path, expected: Mapping[str, str]) -> list[str]:
-    """One line per file of `folder` that has not the checksum expected."""
-    found = []
-    for name, checksum in expected.items():
-        file = folder / name
-        if not file.exists():
-            found.append(f"{file}: is missing; snakemake makes it again")
-        elif sha256(file) != checksum:
-            found.append(f"{file}: has changed since it was made; delete it and run snakemake again")
-    return found
 
 
 def main(folder: Path) -> int:
@@ -61,7 +58,7 @@ def main(folder: Path) -> int:
     if not count:
         print(f"{folder / 'results'}: holds no seed blocks; run the study first: make reproduce")
         return 1
-    found = block_problems(folder) + (crate_problems(folder) if crate.exists() else [])
+    found = block_problems(folder) + seal_problems(folder) + (crate_problems(folder) if crate.exists() else [])
     if found:
         print("\n".join(dict.fromkeys(found)))
         return 1

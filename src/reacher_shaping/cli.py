@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from reacher_shaping import __version__, processor
 
@@ -23,6 +23,15 @@ _EPILOG = (
 )
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints do not steer the terminal."""
+
+    def error(self, message: str) -> NoReturn:
+        from reacher_shaping.storage.files import shown
+
+        super().error(shown(message))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status: 0, or 1 with one line on stderr; argparse exits with 2."""
     options = parser().parse_args(arguments)
@@ -35,6 +44,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ArtifactError, NoDisplayError, OSError, ValueError) as error:
         _say(f"error: {error}")
         return 1
+    except Exception as error:
+        if not _lacks_memory(error):
+            raise
+        _say(f"error: there is not enough memory ({type(error).__name__}: {error})")
+        return 1
     except KeyboardInterrupt:
         return 130
     return 0
@@ -42,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(PROGRAM, description=_DESCRIPTION, epilog=_EPILOG)
+    top = _Parser(PROGRAM, description=_DESCRIPTION, epilog=_EPILOG)
     top.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = top.add_subparsers(title="commands", required=True, metavar="COMMAND")
 
@@ -62,6 +76,7 @@ def parser() -> argparse.ArgumentParser:
     evaluate.set_defaults(run_command=_evaluate)
 
     for command in (play, evaluate):
+        command.add_argument("--force", action="store_true", help="replace the file to write to, if it is there")
         command.add_argument(
             "--seed",
             metavar="N",
@@ -95,9 +110,12 @@ def parser() -> argparse.ArgumentParser:
 def _play(options: argparse.Namespace) -> None:
     from reacher_shaping.evaluation import video, viewer
     from reacher_shaping.evaluation.policies import load_policies
+    from reacher_shaping.storage.files import require_writable
 
     if options.record is None:
         viewer.require_display()
+    else:
+        require_writable(options.record, [options.policy], force=options.force)
     trained = load_policies(options.policy)
     seed = trained.seeds[0] if options.run is None else options.run
     if seed not in trained.seeds:
@@ -136,10 +154,10 @@ def _evaluate(options: argparse.Namespace) -> None:
 
     from reacher_shaping.evaluation.evaluate import evaluate
     from reacher_shaping.evaluation.policies import load_policies
-    from reacher_shaping.storage.files import require_replaceable, write_text
+    from reacher_shaping.storage.files import require_writable, write_text
 
     if options.out is not None:
-        require_replaceable(options.out)
+        require_writable(options.out, options.paths, force=options.force)
     files = [(path, load_policies(path)) for path in options.paths]  # all of them first: a wrong one costs no wait
     tables = []
     for path, trained in files:
@@ -167,12 +185,22 @@ def _evaluate(options: argparse.Namespace) -> None:
             .mean(skipna=False)
             .reset_index()
         )
-        tables.append(means.assign(run=str(path))[list(COLUMNS)])
+        tables.append(means.assign(run=_no_formula(path))[list(COLUMNS)])
     text = pd.concat(tables, ignore_index=True).to_csv(index=False, lineterminator="\n")
     if options.out is None:
         sys.stdout.write(text)
     else:
         write_text(options.out, text)
+
+
+def _lacks_memory(error: Exception) -> bool:
+    """Whether Python, torch, MuJoCo or EGL says with its own exception that memory ran out."""
+    return isinstance(error, MemoryError) or any(word in str(error).lower() for word in ("memory", "bad_alloc"))
+
+
+def _no_formula(path: Path) -> str:
+    """Return the path as a spreadsheet will not compute it: `=cmd.pt` is the same file as `./=cmd.pt`."""
+    return f"./{path}" if str(path).startswith(("=", "+", "-", "@")) else str(path)
 
 
 def _environment(options: argparse.Namespace, trained: "Environment") -> "Environment":
@@ -182,7 +210,9 @@ def _environment(options: argparse.Namespace, trained: "Environment") -> "Enviro
 
 
 def _say(line: str) -> None:
-    sys.stderr.write(f"{PROGRAM}: {' '.join(line.split())}\n")
+    from reacher_shaping.storage.files import shown
+
+    sys.stderr.write(f"{PROGRAM}: {shown(line)}\n")
 
 
 def _number(low: float, allowed: str, *, strict: bool) -> Callable[[str], float]:

@@ -2,6 +2,7 @@
 TABLES = [f"results/{entry.file}" for entry in STUDY_TABLES.values() if entry.always]
 RUN_RADII = f"results/{STUDY_TABLES['run_radii'].file}"
 BLOCK_CELLS = block_cells(STUDY.cells, STUDY.seeds)
+ASKED = asked_of_blocks(STUDY.cells, STUDY.seeds)
 PUBLISHED = {
     "table2": source("report/published/table2.csv"),
     "table3": source("report/published/table3.csv"),
@@ -30,6 +31,7 @@ rule aggregate_runs:
         runtime=growing(30),
     params:
         cells=BLOCK_CELLS,
+        asked=ASKED,
         code=code("aggregate_runs"),
     script:
         "../scripts/aggregate_runs.py"
@@ -60,6 +62,7 @@ rule summarise_episodes:
         episodes=expand("{block}/episodes.parquet", block=BLOCKS),
         manifests=ancient(expand("{block}/manifest.json", block=BLOCKS)),
         long_episodes=expand("{block}/long_episodes.parquet", block=BLOCKS),
+        long_manifests=ancient(expand("{block}/long_episodes.json", block=BLOCKS)),
     output:
         **tables_made("summarise_episodes"),
     log:
@@ -72,6 +75,7 @@ rule summarise_episodes:
         runtime=growing(30),
     params:
         cells=BLOCK_CELLS,
+        asked=ASKED,
         code=code("summarise_episodes"),
     script:
         "../scripts/summarise_episodes.py"

@@ -1,4 +1,6 @@
 # The cells of all studies, and the seed blocks they are trained in.
+from snakemake.io import IOFile
+
 from reacher_shaping.settings.study import block_name
 
 EXPERIMENTS = STUDY.experiment_cells  # the further studies' cells, see experiments.smk
@@ -18,6 +20,42 @@ def blocks(cells, seeds):
 def block_cells(cells, seeds):
     """The cell's key of each of these blocks."""
     return [cell.key for cell in cells for _ in STUDY.blocks(seeds)]
+
+
+def asked(cell, seeds):
+    """What the manifest of a block must tell, or the block is another's."""
+    evaluation = {"settings": json.loads(evaluation_of(cell))}
+    return {"settings": {"cell": cell.settings()}, "seeds": list(seeds), "evaluation": evaluation}
+
+
+def asked_of_blocks(cells, seeds):
+    """The same of many blocks, in the order of `blocks`."""
+    return [as_json(asked(cell, block)) for cell in cells for block in STUDY.blocks(seeds)]
+
+
+def asked_of_block(wildcards):
+    """The same of the block that wildcards name."""
+    return as_json(asked(CELLS[wildcards.cell], SEEDS[wildcards.block]))
+
+
+def as_asked(manifest):
+    """No input, but an end with one line where Snakemake would keep a block made with other settings.
+
+    It knows what a file was made with by its own records. A study that was copied without them looks up to date.
+    """
+
+    def check(wildcards):
+        path = Path(f"results/{wildcards.cell}/{wildcards.block}/{manifest}")
+        if path.exists() and not workflow.persistence.metadata(IOFile(str(path))):
+            from reacher_shaping.storage import files, provenance  # rarely needed, and slow to load
+
+            try:
+                provenance.require_asked(path, asked(CELLS[wildcards.cell], SEEDS[wildcards.block]))
+            except files.ArtifactError as error:
+                sys.exit(f"ArtifactError: {error}")
+        return []
+
+    return check
 
 
 def protocols_of(cells, seeds=None):

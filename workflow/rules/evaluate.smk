@@ -5,6 +5,7 @@ rule evaluate_block:
     input:
         policy="results/{cell}/{block}/policy.pt",
         training=ancient("results/{cell}/{block}/training.json"),
+        made=as_asked("manifest.json"),
     output:
         episodes="results/{cell}/{block}/episodes.parquet",
         manifest="results/{cell}/{block}/manifest.json",
@@ -19,6 +20,7 @@ rule evaluate_block:
         mem_mb=growing(1000),
         runtime=evaluation_minutes,
     params:
+        asked=asked_of_block,
         evaluation=lambda wildcards: evaluation_of(CELLS[wildcards.cell]),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
         root_seed=lambda wildcards: CELLS[wildcards.cell].root_seed,
@@ -31,8 +33,10 @@ rule evaluate_long:
     input:
         policy="results/{cell}/{block}/policy.pt",
         training=ancient("results/{cell}/{block}/training.json"),
+        made=as_asked("long_episodes.json"),
     output:
-        "results/{cell}/{block}/long_episodes.parquet",
+        episodes="results/{cell}/{block}/long_episodes.parquet",
+        manifest="results/{cell}/{block}/long_episodes.json",
     log:
         "results/logs/{cell}/{block}/evaluate_long.log",
     benchmark:
@@ -44,6 +48,7 @@ rule evaluate_long:
         mem_mb=growing(1000),
         runtime=evaluation_minutes,
     params:
+        asked=asked_of_block,
         evaluation=lambda wildcards: evaluation_of(CELLS[wildcards.cell]),
         environment=lambda wildcards: as_json(CELLS[wildcards.cell].protocol.environment.model_dump()),
         root_seed=lambda wildcards: CELLS[wildcards.cell].root_seed,

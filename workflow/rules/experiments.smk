@@ -2,6 +2,9 @@
 # part of the report: MADE are those whose tables are there.
 MADE = [name for name in EXPERIMENTS if all(made(path) for path in tables_of(name))]
 MADE_TABLES = [path for name in MADE for path in tables_of(name)]
+MADE_BLOCKS = [(EXPERIMENTS[name], STUDY.experiments[name].seeds) for name in MADE]
+MADE_MANIFESTS = [f"{block}/manifest.json" for cells_and_seeds in MADE_BLOCKS for block in blocks(*cells_and_seeds)]
+MADE_ASKED = [block for cells_and_seeds in MADE_BLOCKS for block in asked_of_blocks(*cells_and_seeds)]
 MADE_FIGURES = [path for name in MADE for path in figures_of(name)]
 
 
@@ -23,6 +26,7 @@ use rule aggregate_runs as aggregate_experiment with:
         "results/benchmarks/experiments/{experiment}/aggregate.tsv"
     params:
         cells=of_experiment(block_cells),
+        asked=of_experiment(asked_of_blocks),
         code=code("aggregate_runs"),
 
 
@@ -94,6 +98,7 @@ rule summarise_experiment:
         runtime=growing(30),
     params:
         cells=of_experiment(block_cells),
+        asked=of_experiment(asked_of_blocks),
         code=code("summarise_experiment"),
     script:
         "../scripts/summarise_experiment.py"
@@ -145,6 +150,7 @@ rule measure_effects:
 rule summarise_lengths:
     input:
         long_episodes=of_blocks("long_episodes.parquet"),
+        manifests=ancient(of_blocks("long_episodes.json")),
     output:
         **tables_made("summarise_lengths", "{experiment}"),
     log:
@@ -156,6 +162,7 @@ rule summarise_lengths:
     threads: 1
     params:
         cells=of_experiment(block_cells),
+        asked=of_experiment(asked_of_blocks),
         code=code("summarise_lengths"),
     script:
         "../scripts/summarise_lengths.py"

@@ -27,6 +27,7 @@ rule render_media:
         mem_mb=growing(1500),
         runtime=growing(10),
     params:
+        asked=lambda wildcards: as_json(asked(CELL_NAMES[wildcards.name], next(iter(SEEDS.values())))),
         environment=lambda wildcards: as_json(CELL_NAMES[wildcards.name].protocol.environment.model_dump()),
         radius=STUDY.evaluation.radius,
         root_seed=STUDY.root_seed,

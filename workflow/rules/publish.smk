@@ -6,7 +6,9 @@ rule build_crate:
     input:
         files=[
             BLOCK_FILES,
-            expand("{block}/{file}", block=BLOCKS, file=["training.json", "long_episodes.parquet"]),
+            expand(
+                "{block}/{file}", block=BLOCKS, file=["training.json", "long_episodes.parquet", "long_episodes.json"]
+            ),
             TABLES,
             RUN_RADII,
             FIGURES,
@@ -32,6 +34,7 @@ rule build_crate:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
+        asked=ASKED,
         study=as_json(STUDY.model_dump(mode="json")),
         settings_hash=SETTINGS_HASH,
         cells=len(STUDY.cells),

@@ -17,6 +17,7 @@ rule build_report:
         media=MEDIA,
         notebooks=NOTEBOOKS,
         manifests=expand("{block}/manifest.json", block=BLOCKS),
+        further_manifests=MADE_MANIFESTS,
         template=source("src/reacher_shaping/report/report.html.j2"),
         words=WORDS,
     output:
@@ -30,6 +31,11 @@ rule build_report:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
+        asked=ASKED,
+        further_asked=MADE_ASKED,
+        cells=[cell.key for cell in STUDY.cells],
+        seeds=STUDY.seeds,
+        episodes=STUDY.evaluation.episodes,
         study=as_json(STUDY.model_dump(mode="json")),
         settings_hash=SETTINGS_HASH,
         code=code("build_report"),
@@ -54,6 +60,7 @@ use rule build_report as build_reference_report with:
         media=[],
         notebooks=NOTEBOOKS,
         manifests=source("report/reference/manifest.json"),
+        further_manifests=[],
         template=source("src/reacher_shaping/report/report.html.j2"),
         words=WORDS,
     output:

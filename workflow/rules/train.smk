@@ -13,6 +13,8 @@ wildcard_constraints:
 
 
 rule train_block:
+    input:
+        as_asked("training.json"),
     output:
         policy="results/{cell}/{block}/policy.pt",
         progress="results/{cell}/{block}/progress.parquet",

@@ -7,7 +7,8 @@ from pathlib import Path
 from job import logged
 
 from reacher_shaping.storage import crate
-from reacher_shaping.storage.files import seal, write_json
+from reacher_shaping.storage.files import write_json
+from reacher_shaping.storage.provenance import changed_outputs, require_asked
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
@@ -18,15 +19,20 @@ def files(paths: Iterable[str]) -> Iterator[Path]:
         yield from (part for part in path.rglob("[!.]*") if part.is_file()) if path.is_dir() else [path]
 
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
+    manifests = [crate.read_manifest(path) for path in given.manifests]
+    for path, asked in zip(given.manifests, params.asked, strict=True):
+        require_asked(path, json.loads(asked))
+    changed = [line for path in map(Path, given.manifests) for line in changed_outputs(path)]
+    if changed:
+        raise ValueError(changed[0])
     write_json(output.settings, {"study": json.loads(params.study), "sha256": params.settings_hash})
     settings = Path(output.settings)
     found = crate.describe(
         [*set(files(given.files)), settings],
         settings=settings,
-        manifests=[crate.read_manifest(path) for path in given.manifests],
+        manifests=manifests,
         name="Reward shaping for PPO on Reacher-v5",
         description=f"A run of the reacher-shaping study with {params.cells} cells of {params.seeds} seeds.",
     )
     write_json(output.crate, found)
-    seal(output.crate)

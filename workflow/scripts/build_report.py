@@ -5,25 +5,37 @@ from pathlib import Path
 
 from job import logged
 
+from reacher_shaping.analysis import sanity
 from reacher_shaping.report import html
 from reacher_shaping.report.loader import load
-from reacher_shaping.storage.files import read_json, write_text
+from reacher_shaping.storage.files import ArtifactError, read_json, write_text
+from reacher_shaping.storage.provenance import require_asked
 
 given, params = snakemake.input, snakemake.params
 manifests = [given.manifests] if isinstance(given.manifests, str) else given.manifests
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     records = [read_json(path) for path in manifests]
+    if "study" not in records[0]:
+        asked = [*params.asked, *params.further_asked]
+        for path, block in zip([*manifests, *given.further_manifests], asked, strict=True):
+            require_asked(path, json.loads(block))
     # The reference run brings its own settings: config.yaml may ask for another study by now.
     told = (
         records[0]
         if "study" in records[0]
         else {"study": json.loads(params.study), "settings_hash": params.settings_hash}
     )
+    study = load("results", Path(given.table2).parent)
+    if "study" not in records[0]:
+        expected = {"seeds": params.seeds, "episodes": params.episodes}
+        found = sanity.problems(study.runs, study.cells, params.cells, **expected, limits={})
+        if found:
+            raise ArtifactError(given.runs, f"is of another study than config.yaml's: {found[0]}", "run snakemake")
     inputs = html.Inputs(
         settings=told["study"],
         settings_hash=told["settings_hash"],
-        study=load("results", Path(given.table2).parent),
+        study=study,
         figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},
         media=[Path(path) for path in given.media],
         notebooks=[Path(path) for path in given.notebooks],

@@ -12,7 +12,7 @@ from reacher_shaping.tasks.base import load_task
 
 params = snakemake.params
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     cells = read_table(snakemake.input.cells, schemas.CELLS)
     limits = {}

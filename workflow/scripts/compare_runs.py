@@ -11,7 +11,7 @@ from reacher_shaping.storage.files import read_table, write_table
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(given.runs, schemas.RUNS)
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     compared = comparisons.comparison_frame(runs)

@@ -7,7 +7,7 @@ from reacher_shaping.analysis.baselines import agreement_frame
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table, write_table
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     peers = [read_table(path, schemas.PEERS) for path in snakemake.input.peers]
     runs = runs[runs["protocol"] == snakemake.params.protocol]

@@ -8,7 +8,7 @@ from reacher_shaping.report import paper_tables
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table, write_table
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     published = paper_tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))
     theirs = correlations(published[in_table_2(published)].assign(seed=0), "cells")

@@ -21,8 +21,8 @@ params, block = snakemake.params, Path(snakemake.output.episodes).parent
 evaluation = Evaluation.model_validate_json(params.evaluation)
 environment = Environment.model_validate_json(params.environment)
 
-with logged(snakemake.log[0]):
-    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training))
+with logged(snakemake):
+    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training, json.loads(params.asked)))
     policy = Policy.from_weights(trained.weights, load_task(environment.task))
     frames = [
         evaluate(

@@ -15,7 +15,7 @@ params = snakemake.params
 evaluation = Evaluation.model_validate_json(params.evaluation)
 protocols = [Protocol.model_validate(settings) for settings in json.loads(params.protocols)]
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     rows = [
         evaluate_controllers(
             episodes=evaluation.episodes,

@@ -9,7 +9,7 @@ from reacher_shaping.report import captions, paper_tables
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_table
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     cells = read_table(snakemake.input.cells, schemas.CELLS)
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     published = paper_tables.published_cells(pd.read_csv(snakemake.input.table2), pd.read_csv(snakemake.input.table3))

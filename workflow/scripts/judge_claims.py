@@ -23,7 +23,7 @@ def optional(name: str, schema: Table) -> pd.DataFrame | None:
     return read_table(path, schema) if path else None
 
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     ledger = yaml.safe_load(Path(given.ledger).read_text(encoding="utf-8"))
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     runs = read_table(given.runs, schemas.RUNS)

@@ -12,7 +12,7 @@ from reacher_shaping.storage.provenance import unchanged
 
 given, params = snakemake.input, snakemake.params
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(given.runs, schemas.RUNS)
     blocks = zip(params.cells, given.progress, strict=True)
     parts = [read_table(unchanged(path), block_schemas.PROGRESS).assign(**cell) for cell, path in blocks]

@@ -13,7 +13,7 @@ from reacher_shaping.storage.files import read_table, write_table
 params = snakemake.params
 protocols = {settings["name"]: Protocol.model_validate(settings) for settings in json.loads(params.protocols)}
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(snakemake.input.runs, schemas.RUNS)
     switches = Switches.model_validate_json(params.switches)
     effects = switch_effects.effects_frame(runs, switches, protocols)

@@ -11,7 +11,7 @@ from reacher_shaping.storage.reference import read_studies
 
 given, wildcards = snakemake.input, snakemake.wildcards
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     tables = read_studies(path for path in given if "/experiments/" in path)[wildcards.experiment]
     tables = {**tables, "training_logs": pd.read_csv(given.training_logs)}
     figure = drawing.draw(wildcards.view, tables, drawing.STUDY)

@@ -13,7 +13,7 @@ from reacher_shaping.storage.tables import STUDY_TABLES
 
 given, params = snakemake.input, snakemake.params
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     files = {Path(path).name: path for path in given}
     tables = {
         name: read_table(files[entry.file], entry.schema) for name, entry in STUDY_TABLES.items() if entry.file in files

@@ -1,5 +1,7 @@
 """Film the first evaluation episode of a cell's first run, as GIF and MP4."""
 
+import json
+
 from job import logged
 
 from reacher_shaping.evaluation import video
@@ -12,8 +14,8 @@ from reacher_shaping.training.policy import Policy
 params = snakemake.params
 environment = Environment.model_validate_json(params.environment)
 
-with logged(snakemake.log[0]):
-    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training))
+with logged(snakemake):
+    trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training, json.loads(params.asked)))
     weights = {name: tensor[:1] for name, tensor in trained.weights.items()}
     first = Policy.from_weights(weights, load_task(environment.task))
     episode = video.evaluation_episode(

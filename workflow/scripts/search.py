@@ -31,7 +31,7 @@ def measure(values: search.Values) -> search.Values:
     )
 
 
-with logged(snakemake.log[0]) as say:
+with logged(snakemake) as say:
     done = read_table(kept, schemas.TRIALS).head(spec.trials) if kept.exists() else None
     meter = Meter(spec.trials, spec.seeds * spec.budget, 0 if done is None else len(done), unit="trial")
     for trials in search.trials(spec, measure, done):

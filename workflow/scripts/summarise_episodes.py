@@ -1,5 +1,7 @@
 """From evaluation episodes to success against the radius, and to what changes with an episode's length."""
 
+import json
+
 import pandas as pd
 from job import logged
 
@@ -10,18 +12,21 @@ from reacher_shaping.storage.provenance import unchanged
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
+    asked = list(map(json.loads, params.asked))
     episodes = (
-        (cell, read_table(unchanged(path, manifest), block_schemas.EPISODES))
-        for cell, path, manifest in zip(params.cells, given.episodes, given.manifests, strict=True)
+        (cell, read_table(unchanged(path, manifest, block), block_schemas.EPISODES))
+        for cell, block, path, manifest in zip(params.cells, asked, given.episodes, given.manifests, strict=True)
     )
     radii = radius_frame(episodes)
     write_table(output.run_radii, radii, schemas.RUN_RADII)
     write_table(output.radii, radius_cells(radii), schemas.RADII)
     long = pd.concat(
         [
-            read_table(path, block_schemas.LONG_EPISODES).assign(**cell)
-            for cell, path in zip(params.cells, given.long_episodes, strict=True)
+            read_table(unchanged(path, manifest, block), block_schemas.LONG_EPISODES).assign(**cell)
+            for cell, block, path, manifest in zip(
+                params.cells, asked, given.long_episodes, given.long_manifests, strict=True
+            )
         ],
         ignore_index=True,
     )

@@ -1,5 +1,7 @@
 """What an experiment's runs show: logged curves, comparisons, correlations."""
 
+import json
+
 import pandas as pd
 from job import logged
 
@@ -11,9 +13,9 @@ from reacher_shaping.storage.provenance import unchanged
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
 
-with logged(snakemake.log[0]):
+with logged(snakemake):
     runs = read_table(given.runs, schemas.RUNS)
-    blocks = zip(params.cells, given.progress, given.manifests, strict=True)
+    blocks = zip(params.cells, given.progress, given.manifests, map(json.loads, params.asked), strict=True)
     parts = [read_table(unchanged(*file), block_schemas.PROGRESS).assign(**cell) for cell, *file in blocks]
     progress = pd.concat(parts, ignore_index=True)
     write_table(output.logs, switch_effects.logs_frame(progress), schemas.LOGS)

@@ -29,7 +29,7 @@ key = hashlib.sha256(json.dumps([params.cell, params.seeds, params.code, kernels
 radius = cell.protocol.environment.radius(RADIUS)
 settings = {"cell": cell.settings(), "radius": radius}
 
-with logged(snakemake.log[0]) as say:
+with logged(snakemake) as say:
     checkpoints = Path("results/.checkpoints") / key
     store = CheckpointStore(snakemake.resources.checkpoints.removeprefix("local"))
     with training_job.trained_block(

@@ -16,7 +16,7 @@ from reacher_shaping.storage.provenance import Record
 record = Record()
 params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
 
-with logged(snakemake.log[0]) as say:
+with logged(snakemake) as say:
     run = sb3_baselines.peer_run(
         wildcards.algorithm,
         int(wildcards.seed),

@@ -101,7 +101,7 @@ def frames(episode: Episode, title: str) -> list[Image.Image]:
 
 def write_video(path: Path | str, images: Sequence[Image.Image]) -> None:
     """Write the pictures as GIF or MP4, by the path's suffix. Raises ValueError for another suffix."""
-    write = WRITERS.get(Path(path).suffix)
+    write = WRITERS.get(Path(path).suffix.lower())
     if write is None:
         raise ValueError(f"{path}: no kind of video that can be written; allowed: {', '.join(WRITERS)}")
     with replacing(path) as temporary:

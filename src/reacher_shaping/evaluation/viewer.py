@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,13 @@ def require_display() -> None:
         raise NoDisplayError(
             "no display: DISPLAY is not set, so no window can be opened; record a file instead (--record FILE.gif)"
         )
+    import glfw  # not above: the other commands do without it
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)
+        if not glfw.init():
+            where = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+            raise NoDisplayError(f"no display: {where} cannot be opened; record a file instead (--record FILE.gif)")
 
 
 def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, root_seed: int) -> float:

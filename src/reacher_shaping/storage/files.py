@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,13 @@ class ArtifactError(RuntimeError):
     """A file is missing, damaged or not what its name says; the message names it and how to repair it."""
 
     def __init__(self, path: Path | str, problem: str, repair: str = "delete it and run snakemake again"):
-        super().__init__(f"{path}: {' '.join(problem.split())}; {repair}")
+        super().__init__(shown(f"{path}: {problem}; {repair}"))
+
+
+def shown(text: str) -> str:
+    """Return a text on one line as a terminal may show it: what would steer a terminal is spelt out: ESC as x1b."""
+    line = " ".join(text.split())
+    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in line)
 
 
 def require_replaceable(path: Path | str) -> None:
@@ -38,13 +44,31 @@ def require_replaceable(path: Path | str) -> None:
         raise ArtifactError(path, "is no file", "give the path of a file")
 
 
+def require_writable(path: Path | str, inputs: Iterable[Path], *, force: bool) -> None:
+    """Raise ArtifactError unless a file can be written at `path` and nothing is lost by it; called before the work.
+
+    A file that is there is replaced only with `force`, one of `inputs` never.
+    """
+    path = Path(path)
+    require_replaceable(path)
+    if path.exists() and any(path.samefile(read) for read in inputs if read.exists()):
+        raise ArtifactError(path, "is read by this command", "give another name to write to")
+    if path.exists() and not force:
+        raise ArtifactError(path, "is there already", "give another name, or --force to replace it")
+    try:
+        with tempfile.TemporaryFile(dir=next(folder for folder in path.absolute().parents if folder.exists())):
+            pass
+    except OSError as error:
+        raise ArtifactError(path, f"cannot be written ({error.strerror})", "give another name") from None
+
+
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
     """Give a temporary path beside `path`; put what was written there in place of `path` if nothing was raised."""
     path = Path(path)
     require_replaceable(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}.", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -101,17 +125,19 @@ def read_json(path: Path | str) -> dict[str, Any]:
 
 def seal(path: Path | str) -> None:
     """Keep the checksum of a file that was just written, in a hidden folder beside it."""
-    write_text(_seal_of(Path(path)), sha256(path) + "\n")
+    write_text(seal_of(path), sha256(path) + "\n")
 
 
 def check_seal(path: Path | str) -> None:
     """Raise ArtifactError if a file is not as it was when it was sealed; one that never was passes."""
-    kept = _seal_of(Path(path))
+    kept = seal_of(path)
     if kept.exists() and kept.read_text(encoding="utf-8", errors="replace").strip() != sha256(path):
         raise ArtifactError(path, "has changed since it was written")
 
 
-def _seal_of(path: Path) -> Path:
+def seal_of(path: Path | str) -> Path:
+    """Return the file that keeps the checksum of `path`."""
+    path = Path(path)
     return path.parent / ".checksums" / path.name
 
 

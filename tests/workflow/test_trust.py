@@ -1,0 +1,170 @@
+"""A result is believed for what it says: settings, seeds and checksums, on the real workflow at toy scale."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from project import Project
+
+from reacher_shaping.storage.files import read_json, seal_of, sha256
+
+STUDY = {
+    "seeds": 1,
+    "seeds_per_block": 1,
+    "evaluation": {"episodes": 10, "radius": 0.02},
+    "grid": [{"variants": ["none", "l2"], "budgets": [2048]}],
+}
+NONE, L2 = (f"results/paper/{name}/2048/alpha1/seeds0-0" for name in ("none", "l2"))
+SHOWN = ["--allowed-rules", "build_report", "build_crate", "--", "report/report.html", "ro-crate-metadata.json"]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> Project:
+    """The toy study, run to the end."""
+    project = Project(tmp_path_factory.mktemp("study"), STUDY)
+    project.run()
+    return project
+
+
+@pytest.fixture
+def copy(study, tmp_path) -> Project:
+    return study.copied(tmp_path / "copy")
+
+
+def refusal(project: Project, *arguments: str) -> str:
+    """The one line with which a call of Snakemake ends."""
+    done = project.snakemake(*arguments)
+    assert done.returncode != 0, done.stderr[-3000:]
+    lines = [line for line in done.stderr.splitlines() if "ArtifactError" in line]
+    assert len(lines) == 1, done.stderr[-3000:]
+    return lines[0]
+
+
+def with_ppo(**settings) -> list[dict]:
+    return [STUDY["grid"][0] | {"ppo": settings}]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"grid": with_ppo(learning_rate=0.01)}, "ppo.learning_rate = 0.0003, where 0.01 is asked for"),
+        ({"evaluation": {"episodes": 10, "radius": 0.05}}, "settings.radius = 0.02, where 0.05 is asked for"),
+        ({"evaluation": {"episodes": 20, "radius": 0.02}}, "evaluation.settings.episodes = 10, where 20 is asked"),
+        ({"root_seed": 5}, "root_seed"),
+    ],
+    ids=["learning rate", "radius", "episodes", "root seed"],
+)
+def test_report_of_runs_with_other_settings_than_the_configs_is_refused(copy, changes, said):
+    with copy.configured(**changes):
+        line = refusal(copy, *SHOWN)
+    assert f"{NONE}/manifest.json: tells of" in line
+    assert said in line
+
+
+def test_copy_without_snakemakes_records_is_never_shown_with_other_settings(copy):
+    shutil.rmtree(copy.folder / ".snakemake")
+    assert copy.planned() == {}
+    with copy.configured(grid=with_ppo(learning_rate=0.01)):
+        done = copy.snakemake()
+        assert done.returncode != 0
+        assert f"{NONE}/training.json: tells of settings.cell.protocol.ppo.learning_rate = 0.0003" in done.stderr
+        assert "Traceback" not in done.stderr
+        shutil.rmtree(copy.folder / "results/paper")
+        assert len(copy.planned()["train_block"]) == 2 * 4, "deleted as told, they are trained"
+
+
+READERS = {
+    "build_crate": "ro-crate-metadata.json",
+    "build_report": "report/report.html",
+    "summarise_episodes": "results/radii.parquet",
+    "aggregate_runs": "results/runs.parquet",
+    "render_media": "results/media/paper-none-2048-alpha1.gif",
+    "evaluate_long": f"{NONE}/long_episodes.parquet",
+    "evaluate_block": f"{NONE}/episodes.parquet",
+}
+"""Jobs that read blocks, each with one of its files; from the end on, as a failed job's files are deleted."""
+
+
+def test_exchanged_blocks_are_refused_wherever_they_are_read(copy):
+    none, l2, other = (copy.folder / folder for folder in (NONE, L2, "other"))
+    none.rename(other), l2.rename(none), other.rename(l2)
+    for rule, target in READERS.items():
+        line = refusal(copy, "--forcerun", rule, "--allowed-rules", rule, "--", target)
+        assert "tells of settings.cell.variant.name = l2, where none is asked for" in line, rule
+
+
+EDITED = [
+    "figures/figure_2.svg",
+    "results/notebooks/story.ipynb",
+    f"{L2}/monitor/0.monitor.csv",
+    "figures/forest.pdf",
+    "results/tables/table_2.md",
+    "results/media/paper-l2-2048-alpha1.mp4",
+    f"{L2}/long_episodes.parquet",
+    f"{L2}/manifest.json",
+]
+
+
+def edit(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[:-2] + bytes([content[-2] ^ 1]) + content[-1:])
+
+
+def test_edits_by_hand_are_named_without_a_crate_too(copy):
+    for name in EDITED:
+        edit(copy.folder / name)
+    (copy.folder / "ro-crate-metadata.json").unlink()
+    named = copy.python("workflow/verify.py")
+    assert named.returncode == 1
+    said = set(named.stdout.splitlines())
+    assert said >= {f"{name}: has changed since it was made; delete it and run snakemake again" for name in EDITED[:-1]}
+    assert any(line.startswith(f"{EDITED[-1]}: ") for line in said)
+
+
+@pytest.mark.parametrize("name", EDITED[:3])
+def test_edit_by_hand_gets_into_no_crate(copy, name):
+    edit(copy.folder / name)
+    done = copy.snakemake("--forcerun", "build_crate", *SHOWN)
+    assert done.returncode != 0
+    assert f"{name}: has changed since it was" in done.stderr
+    assert not (copy.folder / "ro-crate-metadata.json").exists()
+
+
+def test_every_file_of_the_crate_has_its_makers_checksum(study):
+    listed = [entity["@id"] for entity in read_json(study.folder / "ro-crate-metadata.json")["@graph"]
+              if entity["@type"] == "File"]  # fmt: skip
+    blocks = {path.parent: read_json(path)["outputs"] for path in study.folder.glob("results/*/*/*/*/*/manifest.json")}
+    inside = {str((folder / name).relative_to(study.folder)) for folder, names in blocks.items() for name in names}
+    for name in listed:
+        seal = seal_of(study.folder / name)
+        assert name in inside or seal.read_text().strip() == sha256(study.folder / name), name
+
+
+def test_unpacked_archive_still_knows_what_its_files_were(study, tmp_path):
+    done = study.python("workflow/archive.py", ".", str(tmp_path / "study.zip"))
+    assert done.returncode == 0, done.stderr
+    shutil.unpack_archive(tmp_path / "study.zip", tmp_path / "out")
+    figure = tmp_path / "out/figures/figure_1.svg"
+    figure.write_text(figure.read_text() + " ")
+    (tmp_path / "out/ro-crate-metadata.json").unlink()
+    named = study.python("workflow/verify.py", str(tmp_path / "out"))
+    assert named.returncode == 1
+    assert f"{figure}: has changed" in named.stdout
+
+
+def test_blocks_of_different_versions_are_named(copy):
+    manifest = copy.folder / L2 / "manifest.json"
+    text = manifest.read_text()
+    mujoco = read_json(manifest)["versions"]["mujoco"]
+    manifest.write_text(text.replace(f'"mujoco": "{mujoco}"', '"mujoco": "3.3.7"'))
+    shutil.rmtree(manifest.parent / ".checksums")
+    done = copy.snakemake(
+        "--forcerun", "aggregate_runs", "--allowed-rules", "aggregate_runs", "--", "results/runs.parquet"
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert (
+        "blocks of different versions, so of bits that no one machine makes again: mujoco 3.17.0 and 3.3.7"
+        in done.stderr
+    )
+    copy.run("--allowed-rules", "build_report", "--", "report/report.html")
+    assert "mujoco 3.17.0 and 3.3.7" in Path(copy.folder / "report/report.html").read_text()
