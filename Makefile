@@ -78,8 +78,8 @@ archive: $(READY) ## report, tables, figures, runs and manifests in one zip, rea
 verify: $(READY) ## are the study's files as they were made? recomputes the checksums
 	@python workflow/verify.py
 
-reference: $(READY) ## make the run in results/ the reference run: report/reference/ and the README's headline
-	@python workflow/keep_reference.py
+reference: $(READY) ## make the run in results/ the reference run: report/reference/ and the README's headline; FORCE=1 whatever is lost
+	@python workflow/keep_reference.py $(if $(FORCE),--force)
 
 test: $(READY) ## the tests
 	python -m pytest

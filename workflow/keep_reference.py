@@ -1,12 +1,15 @@
 """Make the run in `results/` the reference run: keep its summaries, and tell them in the README.
 
-python workflow/keep_reference.py
+    python workflow/keep_reference.py [--force] [OVERLAY.yaml]
+
+The folder is made anew beside the old one and takes its place whole. Ends with 1, and changes nothing, where something
+would be lost or a block cannot be traced to a commit; --force keeps the run all the same.
 """
 
+import argparse
 import shutil
 import sys
 from collections.abc import Iterable
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,26 +17,38 @@ from reacher_shaping.report.loader import load
 from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.outputs import judged, table_files
-from reacher_shaping.settings.study import block_name, load_study, read_settings, settings_hash
-from reacher_shaping.storage.files import ArtifactError, read_json, write_json, write_text
-from reacher_shaping.storage.reference import keep_experiments, keep_tables, manifest, published_bits
+from reacher_shaping.settings.study import Study, block_name, load_study, read_settings, settings_hash
+from reacher_shaping.storage.files import ArtifactError, check_seal, read_json, write_json, write_text
+from reacher_shaping.storage.provenance import require_asked
+from reacher_shaping.storage.reference import (
+    checksums,
+    keep_experiments,
+    keep_tables,
+    manifest,
+    objections,
+    published_bits,
+    replaced,
+)
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 FIGURE = "headline.svg"
 
 
-def manifests(cells: Iterable[Cell], blocks: Iterable[range]) -> list[dict[str, Any]]:
-    """The manifests of the blocks of cells."""
-    folders = [RESULTS / cell.folder / block_name(seeds) for cell, seeds in product(cells, blocks)]
-    return [read_json(folder / "manifest.json") for folder in folders]
+def manifests(study: Study, cells: Iterable[Cell], seeds: int) -> list[dict[str, Any]]:
+    """The manifests of the blocks of cells. Raises ArtifactError for a block that was made with other settings."""
+    found = []
+    for cell in cells:
+        for block in study.blocks(seeds):
+            path = RESULTS / cell.folder / block_name(block) / "manifest.json"
+            found.append(require_asked(path, {"settings": {"cell": cell.settings()}, "seeds": list(block)}))
+    return found
 
 
-def main() -> None:
-    settings = read_settings("config.yaml", *sys.argv[1:2])
-    study = load_study(settings)
-    blocks = manifests(study.cells, study.blocks())
-    bits = published_bits(blocks)
-    keep_tables(RESULTS, KEPT)
+def write_folder(study: Study, folder: Path) -> dict[str, Any]:
+    """Write all of the reference run into an empty folder; return its manifest."""
+    blocks = manifests(study, study.cells, study.seeds)
+    write_json(folder / "bits.json", published_bits(blocks))
+    keep_tables(RESULTS, folder)
     files = {
         name: table_files(
             switches=own.switches is not None,
@@ -42,19 +57,34 @@ def main() -> None:
         )
         for name, own in study.experiments.items()
     }
-    made = keep_experiments(RESULTS, KEPT, files)
     further = {
-        name: manifests(study.experiment_cells[name], study.blocks(study.experiments[name].seeds)) for name in made
+        name: manifests(study, study.experiment_cells[name], study.experiments[name].seeds)
+        for name in keep_experiments(RESULTS, folder, files)
     }
-    resolved = study.model_dump(mode="json")
+    figure = Path("figures/figure_2.svg")
+    check_seal(figure)
+    shutil.copyfile(figure, folder / FIGURE)
     peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
-    record = manifest(resolved, settings_hash(study), blocks, further, peers)
-    write_json(KEPT / "manifest.json", record)
-    write_json(KEPT / "bits.json", bits)
-    shutil.copyfile("figures/figure_2.svg", KEPT / FIGURE)
+    record = manifest(study.model_dump(mode="json"), settings_hash(study), blocks, further, peers)
+    record["tables"] = checksums(folder)
+    write_json(folder / "manifest.json", record)
+    return record
 
-    text = headline(load(KEPT, "report/published"), record, f"{KEPT}/{FIGURE}")
-    write_text(README, put_headline(README.read_text(encoding="utf-8"), text))
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Make the run in results/ the reference run.")
+    parser.add_argument("overlay", nargs="*", help="a YAML file laid over config.yaml")
+    parser.add_argument("--force", action="store_true", help="whatever is lost by it")
+    options = parser.parse_args()
+    study = load_study(read_settings("config.yaml", *options.overlay))
+    with replaced(KEPT) as folder:
+        record = write_folder(study, folder)
+        against = objections(KEPT, folder)
+        if against and not options.force:
+            raise ValueError(f"results/ does not become the reference run: {'; '.join(against)}. --force keeps it")
+        text = headline(load(folder, "report/published"), record, f"{KEPT}/{FIGURE}")
+        readme = put_headline(README.read_text(encoding="utf-8"), text)
+    write_text(README, readme)
     print(f"The reference run: {KEPT} and README.md")
 
 

@@ -111,9 +111,9 @@ def take(block: Block, found: list[Part], settings: Study, codes: Codes, folder:
     fit = [part for part in fit if part.record.get("code") == codes.training(block.cell)]
     whole = [part for part in fit if state(block, part.record, settings, codes) in KEPT]
     into = folder / block.folder
+    shutil.rmtree(into / ".checksums", ignore_errors=True)  # of files that are here no more
     if whole:
         names = [*whole[0].record["outputs"], "training.json", "manifest.json"]
-        shutil.rmtree(into / ".checksums", ignore_errors=True)  # of files that were here before
         for name in names:
             (into / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(whole[0].folder / name, into / name)

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from reacher_shaping.storage.crate import METADATA, checksums
-from reacher_shaping.storage.files import ArtifactError
+from reacher_shaping.storage.files import ArtifactError, read_json
 from reacher_shaping.storage.provenance import changed_outputs, differing
 
 MADE = ("results", "figures", "report")  # folders of what the jobs make
@@ -44,10 +44,17 @@ def seal_problems(folder: Path) -> list[str]:
     return found
 
 
+def reference_problems(folder: Path) -> list[str]:
+    """The same for the files of the reference run that is kept there, by its manifest."""
+    manifest = folder / "report" / "reference" / "manifest.json"
+    tables = read_json(manifest).get("tables", {}) if manifest.exists() else {}
+    return differing(manifest.parent, tables)
+
+
 def crate_problems(folder: Path) -> list[str]:
     """The same for the files that the study's crate lists."""
     try:
-        return list(differing(folder, checksums(folder / METADATA)))
+        return differing(folder, checksums(folder / METADATA))
     except ArtifactError as error:
         return [str(error)]
 
@@ -58,7 +65,8 @@ def main(folder: Path) -> int:
     if not count:
         print(f"{folder / 'results'}: holds no seed blocks; run the study first: make reproduce")
         return 1
-    found = block_problems(folder) + seal_problems(folder) + (crate_problems(folder) if crate.exists() else [])
+    found = block_problems(folder) + seal_problems(folder) + reference_problems(folder)
+    found += crate_problems(folder) if crate.exists() else []
     if found:
         print("\n".join(dict.fromkeys(found)))
         return 1

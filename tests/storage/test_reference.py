@@ -18,8 +18,8 @@ from reacher_shaping.report.loader import load
 from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.settings import outputs
 from reacher_shaping.storage import schemas
-from reacher_shaping.storage.files import ArtifactError, read_table, write_table
-from reacher_shaping.storage.reference import TABLES, keep_experiments, keep_tables
+from reacher_shaping.storage.files import ArtifactError, read_table, write_json, write_table, write_text
+from reacher_shaping.storage.reference import TABLES, checksums, keep_experiments, keep_tables, objections, replaced
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "report" / "reference"
@@ -152,3 +152,66 @@ def test_verdicts_of_two_studies_stand_side_by_side():
     assert compared["same"].to_list() == [True, False, True]
     assert verdicts_agree(compared) == "Of 3 verdicts 2 are the same, 2.2 were to be expected. Others: C2."
     assert verdicts_agree(compared.head(0)) == "No claim is tested in both."
+
+
+def kept_folder(folder, *, runs=2, files=("runs.parquet",), dirty=False, codes=("a", "a")):
+    """A reference run of two blocks of one cell, of empty tables."""
+    for name in files:
+        write_text(folder / name, name)
+    cell = {"protocol": "paper", "variant": "l2", "budget": 1, "alpha0": 1.0}
+    blocks = [
+        {
+            "cell": cell,
+            "task": "reacher",
+            "seeds": list(range(runs)),
+            "code": code,
+            "git": {"commit": "c", "dirty": dirty},
+        }
+        for code in codes
+    ]
+    write_json(folder / "manifest.json", {"blocks": blocks, "experiments": {}, "peers": []})
+    return folder
+
+
+def test_run_that_loses_nothing_and_is_traced_may_be_the_reference(tmp_path):
+    kept, new = kept_folder(tmp_path / "kept"), kept_folder(tmp_path / "new", runs=3)
+    assert objections(kept, new) == []
+    assert objections(tmp_path / "none", new) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"runs": 1}, "it has 2 runs of the main study, the one that is kept 4"),
+        ({"files": ()}, "it lacks 1 files of the one that is kept, such as runs.parquet"),
+        ({"dirty": True}, "2 of its 2 blocks were not trained from a clean commit"),
+        ({"dirty": None}, "2 of its 2 blocks were not trained from a clean commit"),
+        ({"codes": ("a", "b")}, "its blocks of l2 on reacher were trained by 2 different codes"),
+    ],
+)
+def test_what_a_new_reference_would_lose_or_cannot_tell_is_said(tmp_path, changes, said):
+    assert objections(kept_folder(tmp_path / "kept"), kept_folder(tmp_path / "new", **changes)) == [said]
+
+
+def test_folder_is_replaced_whole_or_not_at_all(tmp_path):
+    kept = kept_folder(tmp_path / "kept", files=("a", "b"))
+    before = checksums(kept)
+    with pytest.raises(ZeroDivisionError), replaced(kept) as new:
+        write_text(new / "a", f"half of the new {1 / 0}")
+    assert checksums(kept) == before
+    kept.rename(tmp_path / ".kept.old")  # as a process does that is killed between two renames
+    with pytest.raises(ZeroDivisionError), replaced(kept) as new:
+        write_text(new / "a", f"half of the new {1 / 0}")
+    assert checksums(kept) == before
+    with replaced(kept) as new:
+        write_text(new / "c", "new")
+    assert checksums(kept).keys() == {"c"}
+    assert [path.name for path in tmp_path.iterdir() if path.name != "kept"] == []
+
+
+@needs_reference
+def test_kept_files_are_those_that_the_manifest_has_the_checksums_of():
+    record = json.loads((KEPT / "manifest.json").read_text())
+    if "tables" not in record:
+        pytest.skip("kept before a manifest told checksums")
+    assert record["tables"] == checksums(KEPT)

@@ -4,9 +4,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from project import Project
+from project import ROOT, Project
 
 from reacher_shaping.storage.files import read_json, seal_of, sha256
+from reacher_shaping.storage.reference import checksums
 
 STUDY = {
     "seeds": 1,
@@ -167,4 +168,30 @@ def test_blocks_of_different_versions_are_named(copy):
         in done.stderr
     )
     copy.run("--allowed-rules", "build_report", "--", "report/report.html")
-    assert "mujoco 3.17.0 and 3.3.7" in Path(copy.folder / "report/report.html").read_text()
+    assert "mujoco 3.17.0 / 3.3.7" in Path(copy.folder / "report/report.html").read_text()
+
+
+def keep(project: Project, *arguments: str):
+    return project.python("workflow/keep_reference.py", *arguments)
+
+
+def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
+    kept, readme = copy.folder / "report/reference", copy.folder / "README.md"
+    shutil.copy(ROOT / "README.md", readme)
+    before, text = checksums(kept), readme.read_text()
+    done = keep(copy)
+    assert done.returncode == 1
+    assert "it has 2 runs of the main study" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert (checksums(kept), readme.read_text()) == (before, text)
+    with copy.edited("workflow/keep_reference.py", "    check_seal(figure)", "    __import__('os').kill(0, 9)"):
+        assert keep(copy, "--force").returncode == -9
+    assert (checksums(kept), readme.read_text()) == (before, text)
+    done = keep(copy, "--force")
+    assert done.returncode == 0, done.stderr
+    record = read_json(kept / "manifest.json")
+    assert record["tables"] == checksums(kept)
+    assert record["blocks"][1]["cell"] == {"protocol": "paper", "variant": "l2", "budget": 2048, "alpha0": 1.0}
+    assert readme.read_text() != text
+    (kept / "claims.csv").write_text("edited")
+    assert "report/reference/claims.csv: has changed since it was made" in copy.python("workflow/verify.py").stdout

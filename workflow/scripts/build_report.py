@@ -9,7 +9,7 @@ from reacher_shaping.analysis import sanity
 from reacher_shaping.report import html
 from reacher_shaping.report.loader import load
 from reacher_shaping.storage.files import ArtifactError, read_json, write_text
-from reacher_shaping.storage.provenance import require_asked
+from reacher_shaping.storage.provenance import differing, require_asked
 
 given, params = snakemake.input, snakemake.params
 manifests = [given.manifests] if isinstance(given.manifests, str) else given.manifests
@@ -20,6 +20,8 @@ with logged(snakemake):
         asked = [*params.asked, *params.further_asked]
         for path, block in zip([*manifests, *given.further_manifests], asked, strict=True):
             require_asked(path, json.loads(block))
+    elif changed := next(differing(Path("results"), records[0].get("tables", {})), None):
+        raise ValueError(changed)
     # The reference run brings its own settings: config.yaml may ask for another study by now.
     told = (
         records[0]

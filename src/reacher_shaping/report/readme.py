@@ -1,7 +1,7 @@
 """The README's block about the reference run."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from reacher_shaping.report.loader import Study
@@ -27,9 +27,16 @@ def _facts(record: Mapping[str, Any]) -> str:
     """Say in one sentence what the reference run was and what it took."""
     blocks = record["blocks"]
     seeds = sorted({seed for block in blocks for seed in block["seeds"]})
-    commits = ", ".join(sorted({str(block["git"]["commit"])[:12] for block in blocks}))
     steps, hours = spent(blocks)
-    return say("readme.facts", seeds=len(seeds), steps=steps / 1e6, hours=hours, code=commits)
+    every = [*blocks, *(block for study in record.get("experiments", {}).values() for block in study)]
+    return say("readme.facts", seeds=len(seeds), steps=steps / 1e6, hours=hours, code=_code(every))
+
+
+def _code(blocks: Iterable[Mapping[str, Any]]) -> str:
+    """Name the commits that blocks were trained from; the manifest has the hash of each one's training code."""
+    dirty = " with uncommitted changes"
+    commits = {f"{str(block['git']['commit'])[:12]}{dirty if block['git']['dirty'] else ''}" for block in blocks}
+    return ", ".join(sorted(commits))
 
 
 def put_headline(readme: str, text: str) -> str:

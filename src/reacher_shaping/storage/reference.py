@@ -1,14 +1,15 @@
 """The reference run: its summaries, kept in the repository, and how another run compares with it."""
 
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from reacher_shaping.storage.block_schemas import Table
-from reacher_shaping.storage.files import read_table, write_table
+from reacher_shaping.storage.files import read_json, read_table, sha256, write_table
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES
 
 _KEPT = [entry for entry in STUDY_TABLES.values() if entry.kept]
@@ -24,6 +25,63 @@ def read_studies(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
     for path in map(Path, paths):
         found.setdefault(path.parent.name, {})[path.stem] = read_table(path, EXPERIMENT_TABLES[path.stem].schema)
     return found
+
+
+@contextmanager
+def replaced(kept: Path) -> Iterator[Path]:
+    """Give an empty folder beside `kept`, and put it in that one's place, whole, if nothing was raised.
+
+    Whenever it is killed, `kept` is the old folder or the new one; between two renames it is set aside, and put back by
+    the next call.
+    """
+    new, old = (kept.with_name(f".{kept.name}.{word}") for word in ("new", "old"))
+    if old.exists() and not kept.exists():
+        old.rename(kept)
+    for folder in (new, old):
+        shutil.rmtree(folder, ignore_errors=True)
+    new.mkdir(parents=True)
+    yield new
+    if kept.exists():
+        kept.rename(old)
+    new.rename(kept)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """Checksum of each file of a reference run by its name in the folder, less the manifest that tells them."""
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file() and path != folder / "manifest.json"]
+    return {str(path.relative_to(folder)): sha256(path) for path in files}
+
+
+def objections(kept: Path, new: Path) -> list[str]:
+    """Say what speaks against `new` in place of `kept`, both folders: what would be lost, blocks that cannot be traced.
+
+    Each has its manifest; an empty or missing `kept` loses nothing.
+    """
+    record = read_json(new / "manifest.json")
+    found = []
+    if (kept / "manifest.json").exists():
+        before, now = (_runs(each) for each in (read_json(kept / "manifest.json"), record))
+        if now < before:
+            found.append(f"it has {now} runs of the main study, the one that is kept {before}")
+        lost = sorted(checksums(kept).keys() - checksums(new).keys())
+        if lost:
+            found.append(f"it lacks {len(lost)} files of the one that is kept, such as {lost[0]}")
+    blocks = [*record["blocks"], *(block for own in record["experiments"].values() for block in own)]
+    unknown = sum(block["git"]["dirty"] is not False for block in blocks)
+    if unknown:
+        found.append(f"{unknown} of its {len(blocks)} blocks were not trained from a clean commit")
+    codes: dict[str, set[str]] = {}  # another task or schedule is other code
+    for block in blocks:
+        codes.setdefault(f"{block['cell']['variant']} on {block['task']}", set()).add(block["code"])
+    several = sorted(name for name, hashes in codes.items() if len(hashes) > 1)
+    if several:
+        found.append(f"its blocks of {several[0]} were trained by {len(codes[several[0]])} different codes")
+    return found
+
+
+def _runs(record: Mapping[str, Any]) -> int:
+    return sum(len(block["seeds"]) for block in record["blocks"])
 
 
 def keep_tables(results: Path, kept: Path) -> None:
@@ -68,13 +126,13 @@ def manifest(
 ) -> dict[str, Any]:
     """Return what the reference run was: settings, and the record of each block, further study's block and peer.
 
-    The records are without their inputs.
+    The records are without their inputs; each block's names its cell.
     """
     numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads", "kernels", "core_type")
-    kept = ("algorithm", "started", "finished", "seeds", "git", "machine", "versions", "outputs", *numbers)
+    kept = ("algorithm", "started", "finished", "seeds", "code", "git", "machine", "versions", "outputs", *numbers)
 
     def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-        return [{name: block[name] for name in kept if name in block} for block in given]
+        return [_cell(block) | {name: block[name] for name in kept if name in block} for block in given]
 
     return {
         "study": settings,
@@ -83,6 +141,16 @@ def manifest(
         "experiments": {name: records(given) for name, given in further.items()},
         "peers": records(peers),
     }
+
+
+def _cell(block: Mapping[str, Any]) -> dict[str, Any]:
+    """The key of a block's cell, under `cell`, and its task; nothing for a peer, which has no cell."""
+    cell = block["settings"].get("cell")
+    if cell is None:
+        return {}
+    names = {"protocol": cell["protocol"]["name"], "variant": cell["variant"]["name"]}
+    task = cell["protocol"]["environment"]["task"]
+    return {"cell": names | {"budget": cell["budget"], "alpha0": cell["alpha0"]}, "task": task}
 
 
 def published_bits(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
