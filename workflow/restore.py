@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from study import HERE, study
-from verify import crate_problems, differing
+from verify import crate_problems
 
 from reacher_shaping.jobs import regroup
 from reacher_shaping.jobs.blocks import Block, Codes, blocks, state, state_on_disk
@@ -28,6 +28,7 @@ from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.study import Study
 from reacher_shaping.storage.crate import METADATA, checksums
 from reacher_shaping.storage.files import ArtifactError, read_json, seal_of
+from reacher_shaping.storage.provenance import differing
 
 KEPT = ("done", "trained")
 

@@ -11,6 +11,7 @@ rule run_notebook:
         words=WORDS,
         training_logs=source("report/published/training_logs.csv"),
         left_out=source("report/published/left_out.csv"),
+        ledger=source("report/claims.yaml"),
         claims="results/claims.csv",
         source=lambda wildcards: NOTEBOOK_SOURCES[wildcards.notebook],
     output:

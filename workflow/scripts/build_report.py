@@ -20,8 +20,8 @@ with logged(snakemake):
         asked = [*params.asked, *params.further_asked]
         for path, block in zip([*manifests, *given.further_manifests], asked, strict=True):
             require_asked(path, json.loads(block))
-    elif changed := next(differing(Path("results"), records[0].get("tables", {})), None):
-        raise ValueError(changed)
+    elif changed := differing(Path("results"), records[0].get("tables", {})):
+        raise ValueError(changed[0])
     # The reference run brings its own settings: config.yaml may ask for another study by now.
     told = (
         records[0]
@@ -31,7 +31,7 @@ with logged(snakemake):
     study = load("results", Path(given.table2).parent)
     if "study" not in records[0]:
         expected = {"seeds": params.seeds, "episodes": params.episodes}
-        found = sanity.problems(study.runs, study.cells, params.cells, **expected, limits={})
+        found = sanity.problems(study.tables["runs"], study.tables["cells"], params.cells, **expected, limits={})
         if found:
             raise ArtifactError(given.runs, f"is of another study than config.yaml's: {found[0]}", "run snakemake")
     inputs = html.Inputs(

@@ -18,6 +18,7 @@ with logged(snakemake), tempfile.TemporaryDirectory() as folder:
             link = Path(folder, name, path.relative_to(folders[name]))
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(path.resolve())
+    Path(folder, "claims.yaml").symlink_to(Path(given.ledger).resolve())  # beside the published values, as in report/
     parameters = {name: name for name in folders}
     notebooks.execute(
         Path(given.source), Path(snakemake.output[0]), parameters, log.with_suffix(".ipynb"), Path(folder)
