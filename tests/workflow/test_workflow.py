@@ -173,9 +173,7 @@ def test_crate_lists_every_file_of_the_study_and_how_it_came_about(project):
     listed = {entity.id for entity in crate.get_by_type("File")}
     made = {path for folder in ("results", "figures", "report") for path in (project.folder / folder).rglob("*")}
     made = {str(path.relative_to(project.folder)) for path in made if path.is_file()}
-    shipped = {"report/claims.yaml"} | {
-        name for name in made if name.startswith(("report/published/", "report/reference/"))
-    }
+    shipped = {name for name in made if name.startswith("report/")} - {"report/report.html"}
     kept_out = {name for name in made if name.startswith(("results/logs/", "results/benchmarks/")) or "/." in name}
     assert listed == made - shipped - kept_out
     assert crate.dereference("results/runs.parquet")["sha256"] == sha256(project.folder / "results/runs.parquet")

@@ -1,7 +1,7 @@
 """The README's block about the reference run."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reacher_shaping.report.loader import Study
@@ -32,11 +32,15 @@ def _facts(record: Mapping[str, Any]) -> str:
     return say("readme.facts", seeds=len(seeds), steps=steps / 1e6, hours=hours, code=_code(every))
 
 
-def _code(blocks: Iterable[Mapping[str, Any]]) -> str:
-    """Name the commits that blocks were trained from; the manifest has the hash of each one's training code."""
-    dirty = " with uncommitted changes"
-    commits = {f"{str(block['git']['commit'])[:12]}{dirty if block['git']['dirty'] else ''}" for block in blocks}
-    return ", ".join(sorted(commits))
+def _code(blocks: Sequence[Mapping[str, Any]]) -> str:
+    """Name the commit that blocks were trained from, or count several, and the blocks that no commit tells of.
+
+    The manifest has the commit of each block, and the hash of its training code.
+    """
+    commits = {str(block["git"]["commit"])[:12] for block in blocks}
+    untold = sum(block["git"]["dirty"] is not False for block in blocks)
+    changed = f", {untold} of {len(blocks)} blocks with uncommitted changes" if untold else ""
+    return f"{f'of {len(commits)} commits' if len(commits) > 1 else commits.pop()}{changed}"
 
 
 def put_headline(readme: str, text: str) -> str:
