@@ -91,8 +91,8 @@ def arm(control_weight):
         return jnp.concatenate([jnp.cos(angle), jnp.sin(angle), target, velocity, tip - target])
 
     def step(state, action):
-        *moving, _, target = state
-        angle, velocity, tip = arm_step(*moving, action.astype(jnp.float64))
+        angle, velocity, _, target = state
+        angle, velocity, tip = arm_step(angle, velocity, action.astype(jnp.float64))
         return (angle, velocity, tip, target), -jnp.linalg.norm(tip - target) - control_weight * (action**2).sum()
 
     return reset, observe, step

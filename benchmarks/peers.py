@@ -138,16 +138,16 @@ def envpool(cell: Cell) -> Callable[[], tuple[float, float]]:
         def close(self):
             self.pool.close()
 
-        def get_attr(self, name, indices=None):
+        def get_attr(self, attr_name, indices=None):
             return [None] * self.num_envs
 
-        def set_attr(self, name, value, indices=None):
+        def set_attr(self, attr_name, value, indices=None):
             raise NotImplementedError
 
-        def env_method(self, name, *args, indices=None, **kwargs):
+        def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
             raise NotImplementedError
 
-        def env_is_wrapped(self, wrapper, indices=None):
+        def env_is_wrapped(self, wrapper_class, indices=None):
             return [False] * self.num_envs
 
     settings = cell.protocol.ppo
