@@ -226,7 +226,7 @@ def test_damaged_file_is_named_when_it_is_read(finished, tmp_path, name, reader,
         shutil.copytree(saved, results)
     assert done.returncode != 0
     [said] = [line for line in done.stderr.splitlines() if "ArtifactError" in line]
-    assert f"{CELL}/seeds0-0/{name}: is not the file that" in said
+    assert f"{CELL}/seeds0-0/{name}: has changed since it was written" in said
     assert "delete it and run snakemake again" in said
 
 

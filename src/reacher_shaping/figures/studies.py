@@ -173,7 +173,8 @@ def effects(effects: pd.DataFrame) -> Figure:
         parts.zero_line(axes)
         axes.set(title="", xlabel=label)
         axes.tick_params(axis="y", length=0)
-        compress(axes, pd.concat([own["ci_low"], own["ci_high"]]))
+        # One run a cell has differences and no intervals.
+        compress(axes, pd.concat([own["difference"], own["ci_low"], own["ci_high"]]).dropna())
         if metric.endswith("rate"):
             percent(axes.xaxis)
         elif metric.endswith("distance"):
