@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from reacher_shaping.labels import DESIGN
+from reacher_shaping.paper_variants import VARIANTS
 from reacher_shaping.report import paper_tables
 
 PUBLISHED = Path(__file__).parents[1] / "report" / "published"
@@ -26,6 +28,11 @@ MEASURES = (
 CURVE = ("peak_return", "final_return", "drop_from_peak", "roughness", "area_under_curve", "steps_to_threshold")
 
 
+def design(variant, **changes):
+    """What the cells of one of the paper's variants are for, in the columns of the tables."""
+    return dict(zip(DESIGN, ("main", *VARIANTS[variant]), strict=True)) | changes
+
+
 def runs(grid, seeds=10):
     """A row per run, as `runs.parquet` has it."""
     generator = np.random.default_rng(1)
@@ -43,7 +50,7 @@ def runs(grid, seeds=10):
             row |= {"peak_return": -9.0, "peak_iteration": 200, "final_return": -10.0, "diverged": False}
             row |= {"drop_from_peak": 1.0 + success, "roughness": success / 5, "area_under_curve": -12.0 + success}
             row |= {"steps_to_threshold": 2048.0 * (50 + seed)}
-            rows.append(row)
+            rows.append(row | design(key[1]))
     return pd.DataFrame(rows)
 
 
@@ -63,7 +70,7 @@ def summary(table):
         for name in names:
             mean, spread = part[name].mean(), 2 * part[name].std(ddof=0) / np.sqrt(len(part))
             columns |= {name: mean, f"{name}_iqm": mean, f"{name}_low": mean - spread, f"{name}_high": mean + spread}
-        rows.append(row | columns)
+        rows.append(row | columns | {name: part[name].iloc[0] for name in DESIGN})
     return pd.DataFrame(rows)
 
 
@@ -109,7 +116,7 @@ def progress(grid, seeds=10):
             noise = generator.normal(0, 1.5, iteration.size)
             curve = -10 - 45 * np.exp(-iteration / 30) - generator.gamma(2.0, 1.0) + noise
             rows = {"seed": seed, "iteration": iteration, "env_steps": 2048 * iteration, "episode_return": curve}
-            parts.append(pd.DataFrame(dict(zip(CELL, key, strict=True)) | rows))
+            parts.append(pd.DataFrame(dict(zip(CELL, key, strict=True)) | rows | design(key[1])))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -1,32 +1,25 @@
 """Names, groups and orders of variants, cells and protocols, and numbers as people read them."""
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
+from reacher_shaping.paper_variants import VARIANTS
+
 CELL = ["variant", "budget", "alpha0"]
 KEY = ["protocol", *CELL]
 """Columns that name a cell: within its protocol, and in the whole study."""
+DESIGN = ["study", "group", "potential", "schedule", "horizon"]
+"""Columns that say what a cell is for: its study, where the paper has such cells, and what its variant is."""
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 Setting = tuple[int, float]  # budget in environment steps, alpha0
 
 
-def group(variant: str) -> str:
-    """`none`, `constant`, `decay` or `decay_l2sq`: the part of the study a variant belongs to."""
-    if variant == "none":
-        return "none"
-    if not variant.startswith("decay"):
-        return "constant"
-    return "decay_l2sq" if variant.endswith("_l2sq") else "decay"
-
-
-def variant_order(variant: str) -> tuple[int, int, str]:
-    """Sort key: the reference, constant shaping, then decay by horizon."""
-    horizon = re.search(r"\d+", variant.removesuffix("_l2sq")) if "decay" in variant else None
-    groups = ("none", "constant", "decay", "decay_l2sq")
-    return groups.index(group(variant)), int(horizon.group()) if horizon else 0, variant
+def variant_order(variant: str) -> tuple[int, str]:
+    """Sort key: the paper's variants in its order, then others by name."""
+    known = list(VARIANTS)
+    return known.index(variant) if variant in known else len(known), variant
 
 
 def cell_order(row: Mapping[Any, Any]) -> tuple[Any, ...]:
@@ -35,11 +28,13 @@ def cell_order(row: Mapping[Any, Any]) -> tuple[Any, ...]:
 
 
 def variant_label(variant: str) -> str:
-    """`decay200k_l2sq` as people read it: `decay 200K, L2²`."""
-    match = re.fullmatch(r"decay(\d+)k(_l2sq)?", variant)
-    if match:
-        return f"decay {match[1]}K" + (", L2²" if match[2] else "")
-    return {"l2": "L2", "l2sq": "L2²"}.get(variant, variant)
+    """A variant of the paper as people read it, such as `decay 200K, L2²`; any other by its name."""
+    if variant not in VARIANTS:
+        return variant
+    _, potential, _, horizon = VARIANTS[variant]
+    if horizon is None:
+        return {"l2": "L2", "l2sq": "L2²"}.get(potential, potential)
+    return f"decay {budget_label(horizon)}" + (", L2²" if potential == "l2sq" else "")
 
 
 def budget_label(steps: int) -> str:
@@ -82,8 +77,8 @@ def stochastic(controllers: pd.DataFrame, protocol: str | None) -> pd.DataFrame:
 
 
 def in_groups(frame: pd.DataFrame, groups: Sequence[str]) -> pd.DataFrame:
-    """The rows whose variant belongs to one of the groups."""
-    return frame[frame["variant"].map(group).isin(list(groups))]
+    """The rows of cells of these groups: `main`, `appendix`, `extra`."""
+    return frame[frame["group"].isin(list(groups))]
 
 
 def settings_of(frame: pd.DataFrame) -> list[Setting]:

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import synthetic
 import yaml
 from scipy import stats as scipy_stats
 
@@ -37,7 +38,7 @@ def make_runs(rate=lambda cell: 0.2, seeds=10, noise=0.05, random=None, cells=CE
         frame["roughness"] = random.lognormal(-3, 0.3, seeds)
         frame["shaking"] = random.lognormal(-1, 0.3, seeds)
         frame["steps_to_threshold"] = random.uniform(5e4, 2e5, seeds)
-        parts.append(frame.assign(**columns))
+        parts.append(frame.assign(**columns, **synthetic.design(variant)))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import synthetic
 from scipy import stats as scipy_stats
 
 from reacher_shaping import stats
@@ -23,7 +24,7 @@ def make_runs(cells=TABLE_2 + TABLE_3, seeds=6, noise=0.05, gain=None, protocol=
         frame = pd.DataFrame(key | {"seed": range(seeds), "episodes": 1000, "success_rate": rate})
         frame["mean_return"] = random.normal(-12, 1, seeds)
         frame["final_success_rate"], frame["final_distance"] = rate / 2, 0.1 - rate / 10
-        parts.append(frame)
+        parts.append(frame.assign(**synthetic.design(variant)))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -195,7 +196,7 @@ def test_the_frames_use_columns_of_runs():
 def test_baseline_with_the_same_label_is_the_partner_where_there_is_one():
     cells = pd.DataFrame(
         [("p", "none", 100, 1.0), ("p", "none", 100, 0.5), ("q", "none", 100, 1.0)], columns=comparisons.KEY
-    )
-    shaped = {"protocol": "p", "variant": "l2", "budget": 100, "alpha0": 0.5}
+    ).assign(**synthetic.design("none"))
+    shaped = {"protocol": "p", "variant": "l2", "budget": 100, "alpha0": 0.5, **synthetic.design("l2")}
     assert comparisons.partner("none", shaped, cells)["alpha0"] == 0.5
     assert comparisons.partner("none", shaped | {"protocol": "q"}, cells)["alpha0"] == 1.0

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import synthetic
 from scipy import stats as scipy_stats
 
 from reacher_shaping.analysis.correlation import CORRELATED, correlation_frame, correlations
@@ -41,7 +42,7 @@ def make_block(variant="l2", seeds=(0, 1, 2), iterations=30, episodes=20, level=
             frame.loc[~frame["success"], "first_hit_step"] = pd.NA
             frame["share_within_radius"] = frame["success"] / 5
             evaluation.append(frame)
-    return KEY | {"variant": variant} | key, pd.concat(progress), pd.concat(evaluation)
+    return KEY | {"variant": variant} | synthetic.design(variant) | key, pd.concat(progress), pd.concat(evaluation)
 
 
 def test_run_row_holds_the_means_of_its_own_episodes():

@@ -1,7 +1,7 @@
 # The cells of all studies, and the seed blocks they are trained in.
 from snakemake.io import IOFile
 
-from reacher_shaping.settings.study import block_name
+from reacher_shaping.settings.study import MAIN, block_name
 
 EXPERIMENTS = STUDY.experiment_cells  # the further studies' cells, see experiments.smk
 CELLS = {cell.folder: cell for cells in [STUDY.cells, *EXPERIMENTS.values()] for cell in cells}
@@ -17,9 +17,9 @@ def blocks(cells, seeds):
     return [f"results/{cell.folder}/{block_name(block)}" for cell in cells for block in STUDY.blocks(seeds)]
 
 
-def block_cells(cells, seeds):
-    """The cell's key of each of these blocks."""
-    return [cell.key for cell in cells for _ in STUDY.blocks(seeds)]
+def block_cells(study):
+    """Of each of the blocks of a study, in their order, the columns of its cell."""
+    return [cell for cell in STUDY.design(study) for _ in STUDY.blocks(STUDY.studies[study].seeds)]
 
 
 def asked(cell, seeds):

@@ -25,7 +25,7 @@ use rule aggregate_runs as aggregate_experiment with:
     benchmark:
         "results/benchmarks/experiments/{experiment}/aggregate.tsv"
     params:
-        cells=of_experiment(block_cells),
+        cells=lambda wildcards: block_cells(wildcards.experiment),
         asked=of_experiment(asked_of_blocks),
         code=code("aggregate_runs"),
 
@@ -97,7 +97,7 @@ rule summarise_experiment:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        cells=of_experiment(block_cells),
+        cells=lambda wildcards: block_cells(wildcards.experiment),
         asked=of_experiment(asked_of_blocks),
         code=code("summarise_experiment"),
     script:

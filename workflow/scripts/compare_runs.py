@@ -4,6 +4,7 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping.analysis import comparisons, scores, single_seed_studies
+from reacher_shaping.analysis.correlation import in_paper
 from reacher_shaping.random_streams import generator
 from reacher_shaping.report import paper_tables
 from reacher_shaping.storage import schemas
@@ -16,12 +17,13 @@ with logged(snakemake):
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     compared = comparisons.comparison_frame(runs)
     write_table(output.comparisons, compared, schemas.COMPARISONS)
-    write_table(output.variance, comparisons.variance_frame(runs), schemas.VARIANCE)
-    write_table(output.power, comparisons.power_frame(runs, published), schemas.POWER)
+    paper = runs[in_paper(runs)]
+    write_table(output.variance, comparisons.variance_frame(paper), schemas.VARIANCE)
+    write_table(output.power, comparisons.power_frame(paper, published), schemas.POWER)
     write_table(output.scores, scores.scores_frame(runs), schemas.SCORES)
     write_table(output.profiles, scores.profiles_frame(runs), schemas.PROFILES)
     random = generator(params.root_seed, "lottery")
-    studies = single_seed_studies.single_seed_studies(runs[runs["protocol"] == params.protocol], random)
+    studies = single_seed_studies.single_seed_studies(paper[paper["protocol"] == params.protocol], random)
     write_table(output.lottery, single_seed_studies.lottery_frame(studies), schemas.LOTTERY)
     write_table(output.winners, single_seed_studies.winners_frame(studies), schemas.WINNERS)
     write_table(output.spread, single_seed_studies.spread_frame(studies), schemas.SPREAD)

@@ -9,6 +9,7 @@ from job import logged
 from reacher_shaping.analysis import claims
 from reacher_shaping.analysis.baselines import untrained_success
 from reacher_shaping.analysis.claim_formulas import Study, with_twins
+from reacher_shaping.analysis.correlation import in_paper
 from reacher_shaping.analysis.sensitivity import sensitivity_frame
 from reacher_shaping.report import paper_tables
 from reacher_shaping.storage import schemas
@@ -28,7 +29,7 @@ with logged(snakemake):
     published = paper_tables.published_cells(pd.read_csv(given.table2), pd.read_csv(given.table3))
     runs = read_table(given.runs, schemas.RUNS)
     study = Study(
-        runs=with_twins(runs[runs["protocol"].isin(params.protocols)], params.twins),
+        runs=with_twins(runs[runs["protocol"].isin(params.protocols) & in_paper(runs)], params.twins),
         long_episodes=optional("long_episodes", schemas.ALL_LONG_EPISODES),
         peers=read_table(given.peers[0], schemas.PEERS) if given.get("peers") else None,
         untrained=untrained_success(read_table(given.controllers, schemas.CONTROLLERS), params.protocols[0]),

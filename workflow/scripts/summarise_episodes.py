@@ -6,6 +6,7 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping.analysis.runs import length_cells, radius_cells, radius_frame
+from reacher_shaping.labels import KEY
 from reacher_shaping.storage import block_schemas, schemas
 from reacher_shaping.storage.files import read_table, write_table
 from reacher_shaping.storage.provenance import unchanged
@@ -23,7 +24,7 @@ with logged(snakemake):
     write_table(output.radii, radius_cells(radii), schemas.RADII)
     long = pd.concat(
         [
-            read_table(unchanged(path, manifest, block), block_schemas.LONG_EPISODES).assign(**cell)
+            read_table(unchanged(path, manifest, block), block_schemas.LONG_EPISODES).assign(**{name: cell[name] for name in KEY})
             for cell, block, path, manifest in zip(
                 params.cells, asked, given.long_episodes, given.long_manifests, strict=True
             )

@@ -16,18 +16,21 @@ from reacher_shaping import stats
 from reacher_shaping.analysis.claim_estimates import Array, Cell, Estimate, MissingError, Sample
 from reacher_shaping.analysis.runs import steps_or_budget
 from reacher_shaping.labels import CELL
+from reacher_shaping.paper_variants import VARIANTS, of_group
 
 SHORT, LONG = 500_000, 1_000_000
 BUDGETS = (SHORT, LONG)
-CONSTANT = ("l2", "l2sq")
-DECAYED = ("decay200k", "decay300k", "decay500k")
+CONSTANT, DECAYED = (
+    tuple(name for name in of_group("main") if name != "none" and VARIANTS[name].schedule == schedule)
+    for schedule in ("constant", "linear")
+)
 SHAPED: list[Cell] = [
     (variant, budget, alpha0)
     for budget, alpha0 in ((SHORT, 1.0), (LONG, 1.0), (SHORT, 0.5))
     for variant in CONSTANT + DECAYED
 ]
 TABLE_2: list[Cell] = [("none", SHORT, 1.0), ("none", LONG, 1.0), *SHAPED]
-TABLE_3: list[Cell] = [(f"{variant}_l2sq", budget, 0.5) for variant in DECAYED for budget in BUDGETS]
+TABLE_3: list[Cell] = [(variant, budget, 0.5) for variant in of_group("appendix") for budget in BUDGETS]
 BEST: Cell = ("decay300k", LONG, 1.0)
 
 

@@ -1,6 +1,7 @@
 """Tables of what differs from what: paired comparisons, probability of improvement, variance, power.
 
-Families, stated before any run; Holm's correction is over one family of one metric in one protocol:
+Families, stated before any run; Holm's correction is over one family of one metric in one protocol. Cells that the
+paper has and others are families of their own, so that a cell that is added changes nothing of the paper's:
 
 | family | each comparison | asks |
 |---|---|---|
@@ -24,7 +25,7 @@ import pandas as pd
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.analysis.runs import Block, curve_array
-from reacher_shaping.labels import CELL, KEY
+from reacher_shaping.labels import CELL, DESIGN, KEY
 
 METRICS = ("success_rate", "mean_return", "final_success_rate", "final_distance")
 SPEED = ("area_under_curve",)
@@ -32,25 +33,37 @@ SPEED = ("area_under_curve",)
 FAMILIES = ("none", "constant", "longer", "half", "squared")
 
 
-def partner(family: str, key: Mapping[Any, Any], cells: pd.DataFrame) -> dict[str, Any] | None:
-    """Key of the cell that `key` is compared with in a family; None if it takes no part. May not exist."""
-    own, variant = dict(key), str(key["variant"])
-    if family == "none" and variant != "none":
+def partner(family: str, cell: Mapping[Any, Any], cells: pd.DataFrame) -> dict[str, Any] | None:
+    """Key of the cell that `cell` is compared with in a family; None if it takes no part. May not exist.
+
+    `cell` and `cells` hold the key, `potential`, `schedule` and `horizon`.
+    """
+    own = {name: cell[name] for name in KEY}
+    shaped = cell["potential"] != "none"
+    if family == "none" and shaped:
         labelled = own | {"variant": "none"}  # where alpha0 is a label, the baseline has it too
         there = (cells[KEY] == pd.Series(labelled)).all(axis=1).any()
         return labelled if there else labelled | {"alpha0": 1.0}
-    if family == "constant" and variant.startswith("decay"):
-        return own | {"variant": "l2sq" if variant.endswith("_l2sq") else "l2"}
-    if family == "squared" and variant.endswith("l2sq"):
-        return own | {"variant": "l2" if variant == "l2sq" else variant.removesuffix("_l2sq")}
-    if family == "half" and key["alpha0"] == 0.5:
+    if family == "constant" and shaped and cell["schedule"] != "constant":
+        return _other_variant(own, cells, potential=cell["potential"], schedule="constant")
+    if family == "squared" and cell["potential"] == "l2sq":
+        return _other_variant(own, cells, potential="l2", schedule=cell["schedule"], horizon=cell["horizon"])
+    if family == "half" and cell["alpha0"] == 0.5:
         return own | {"alpha0": 1.0}
     if family == "longer":
         rest = [name for name in KEY if name != "budget"]
         budgets = cells.loc[(cells[rest] == pd.Series({name: own[name] for name in rest})).all(axis=1), "budget"]
-        if key["budget"] == budgets.max() != budgets.min():
+        if cell["budget"] == budgets.max() != budgets.min():
             return own | {"budget": budgets.min()}
     return None
+
+
+def _other_variant(own: dict[str, Any], cells: pd.DataFrame, **design: Any) -> dict[str, Any] | None:
+    """Key of the cell that differs from `own` by a variant of this design; None where there is none."""
+    wanted = {name: value for name, value in own.items() if name != "variant"} | design
+    for name, value in wanted.items():
+        cells = cells[cells[name].isna() if pd.isna(value) else cells[name] == value]
+    return None if cells.empty else own | {"variant": cells["variant"].iloc[0]}
 
 
 def comparison_frame(runs: pd.DataFrame, metrics: Sequence[str] = METRICS) -> pd.DataFrame:
@@ -61,23 +74,26 @@ def comparison_frame(runs: pd.DataFrame, metrics: Sequence[str] = METRICS) -> pd
     better), improvement_low, improvement_high, seeds, family_low, family_high (limits of the difference that hold for
     all comparisons of the family and metric at once).
     """
-    cells = runs[KEY].drop_duplicates()
+    cells = runs[[*KEY, *DESIGN]].drop_duplicates()
+    paper = cells[cells["group"] != "extra"]
     by_cell = {tuple(key): own.set_index("seed") for key, own in runs.groupby(KEY)}
     rows = []
     for family in FAMILIES:
-        pairs = [(key, other) for key in cells.to_dict("records") if (other := partner(family, key, cells))]
+        asked = [(key, cells if key["group"] == "extra" else paper) for key in cells.to_dict("records")]
+        pairs = [(key, other) for key, among in asked if (other := partner(family, key, among))]
         pairs = [pair for pair in pairs if tuple(pair[1][name] for name in KEY) in by_cell]
-        sizes = Counter(key["protocol"] for key, _ in pairs)
+        sizes = Counter((key["protocol"], key["group"] == "extra") for key, _ in pairs)
         for key, other in pairs:
             ours, theirs = (by_cell[tuple(which[name] for name in KEY)] for which in (key, other))
+            extra = key["group"] == "extra"
             named = {name: key[name] for name in KEY} | {f"other_{name}": other[name] for name in KEY[1:]}
             for metric in metrics:
                 better = -1 if metric.endswith("distance") else 1
-                compared = _compare(ours[metric], theirs[metric], better, among=sizes[key["protocol"]])
-                rows.append({"family": family, "metric": metric} | named | compared)
-    columns = ["family", "metric", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED]
+                compared = _compare(ours[metric], theirs[metric], better, among=sizes[key["protocol"], extra])
+                rows.append({"family": family, "metric": metric, "extra": extra} | named | compared)
+    columns = ["family", "metric", "extra", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED]
     frame = pd.DataFrame(rows, columns=[name for name in columns if name != "p_holm"])
-    return stats.with_holm(frame, ["protocol", "family", "metric"])
+    return stats.with_holm(frame, ["protocol", "family", "metric", "extra"]).drop(columns="extra")
 
 
 COMPARED = [

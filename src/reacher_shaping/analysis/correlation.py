@@ -16,13 +16,17 @@ from reacher_shaping.labels import KEY
 CORRELATED = ["alpha0", "success_rate", "mean_return", "budget"]
 MEASURED = ("success_rate", "mean_return")
 LEVELS = ("cells", "runs")
+COLUMNS = ["method", "x", "y", "r", "ci_low", "ci_high", "n", "level"]
 
 
 def in_table_2(frame: pd.DataFrame) -> "pd.Series[bool]":
-    """Rows of the paper's main table: all but the decayed L2-squared variants of its appendix, which its
-    correlation matrix leaves out.
-    """
-    return ~frame["variant"].str.fullmatch(r"decay.*_l2sq")
+    """Rows of the paper's main table; its correlation matrix leaves the appendix out."""
+    return frame["group"] == "main"
+
+
+def in_paper(frame: pd.DataFrame) -> "pd.Series[bool]":
+    """Rows of cells that the paper has, in its main table or its appendix."""
+    return frame["group"] != "extra"
 
 
 def correlations(runs: pd.DataFrame, level: str) -> pd.DataFrame:
@@ -42,7 +46,7 @@ def correlations(runs: pd.DataFrame, level: str) -> pd.DataFrame:
                 low, high = stats.fisher_interval(values, seeds) if measured else stats.NO_INTERVAL
                 pairs = [(x, y)] if x == y else [(x, y), (y, x)]
                 records += [(method, *pair, float(values[0]), low, high, count, level) for pair in pairs]
-    return pd.DataFrame(records, columns=["method", "x", "y", "r", "ci_low", "ci_high", "n", "level"])
+    return pd.DataFrame(records, columns=COLUMNS)
 
 
 def _columns(runs: pd.DataFrame, single: bool) -> tuple[dict[str, NDArray[np.float64]], int]:
@@ -79,8 +83,9 @@ def correlation_frame(runs: pd.DataFrame) -> pd.DataFrame:
     """
     parts = [
         correlations(chosen, level + suffix).assign(protocol=protocol)
-        for protocol, own in runs.groupby("protocol")
+        for protocol, own in runs[in_paper(runs)].groupby("protocol")
         for suffix, chosen in (("", own[in_table_2(own)]), ("_all", own))
         for level in LEVELS
+        if len(chosen)
     ]
-    return pd.concat(parts, ignore_index=True)
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=[*COLUMNS, "protocol"])

@@ -32,7 +32,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from reacher_shaping.labels import KEY
+from reacher_shaping.labels import DESIGN, KEY
 
 
 def curve_table(progress: pd.DataFrame, confidence: float = 0.95, column: str = "episode_return") -> pd.DataFrame:
@@ -40,7 +40,7 @@ def curve_table(progress: pd.DataFrame, confidence: float = 0.95, column: str = 
 
     `progress` holds the cell's key (`protocol, variant, budget, alpha0`) beside the columns of
     `progress.parquet`. The result has a row per cell and iteration: the key, `iteration`,
-    `env_steps`, `episode_return`, `low`, `high`, `seeds`. A return that is not finite counts as
+    `env_steps`, `episode_return`, `low`, `high`, `seeds`, and the cell's design. A return that is not finite counts as
     missing, so `seeds` is the number of runs behind a point; one seed gives no band (NaN).
     """
     finite = progress.assign(episode_return=progress[column].replace([np.inf, -np.inf], np.nan))
@@ -48,18 +48,16 @@ def curve_table(progress: pd.DataFrame, confidence: float = 0.95, column: str = 
     found = finite.groupby(keys, sort=True)["episode_return"].agg(["mean", "sem", "count"])
     degrees = (found["count"] - 1).clip(lower=1)
     half_width = found["sem"] * stats.t.ppf(0.5 + confidence / 2, degrees)
-    return (
-        pd.DataFrame(
-            {
-                "episode_return": found["mean"],
-                "low": found["mean"] - half_width,
-                "high": found["mean"] + half_width,
-                "seeds": found["count"],
-            }
-        )
-        .reset_index()
-        .sort_values(keys, ignore_index=True)
-    )
+    curves = pd.DataFrame(
+        {
+            "episode_return": found["mean"],
+            "low": found["mean"] - half_width,
+            "high": found["mean"] + half_width,
+            "seeds": found["count"],
+        }
+    ).reset_index()
+    design = progress[[*KEY, *DESIGN]].drop_duplicates(KEY).astype({"horizon": float})
+    return curves.merge(design, on=KEY, validate="many_to_one").sort_values(keys, ignore_index=True)
 
 
 WINDOW = 20

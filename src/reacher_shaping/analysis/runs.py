@@ -1,7 +1,7 @@
 """From the blocks' tables to the study's: a row per run, per cell, per pair of correlated columns.
 
-A block is `(key, progress, episodes)`: the cell's `protocol, variant, budget, alpha0` and two frames in
-the columns of the data contract. Blocks are taken one at a time from any iterable, so a study of 230 runs
+A block is `(key, progress, episodes)`: the cell's `protocol, variant, budget, alpha0` and design (`labels.DESIGN`), and
+two frames in the columns of the data contract. Blocks are taken one at a time from any iterable, so a study of 230 runs
 never holds more than one block's episodes.
 
 Unprefixed evaluation columns are the stochastic evaluation, the paper's; `deterministic_` ones use the
@@ -19,12 +19,12 @@ from numpy.typing import ArrayLike
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
 from reacher_shaping.evaluation.metrics import EVALUATION, evaluation_metrics
-from reacher_shaping.labels import KEY
+from reacher_shaping.labels import DESIGN, KEY
 
 Block = tuple[Mapping[str, Any], pd.DataFrame, pd.DataFrame]
 CURVE = ["peak_return", "peak_iteration", "final_return", "drop_from_peak", "roughness", "shaking", "area_under_curve"]
 METRICS = EVALUATION + [f"deterministic_{name}" for name in EVALUATION] + CURVE + ["steps_to_threshold", "action_std"]
-RUNS = [*KEY, "seed", "episodes", *METRICS, "diverged"]
+RUNS = [*KEY, "seed", "episodes", *METRICS, "diverged", *DESIGN]
 RATES = [name for name in METRICS if name.endswith("success_rate")]
 RADII = tuple(round(0.005 * step, 3) for step in range(1, 11))
 OVER_SEEDS = "95 % t over seeds"
@@ -55,6 +55,7 @@ def _block_runs(block: Block) -> tuple[pd.DataFrame, pd.DataFrame]:
     runs["diverged"] = ~np.logical_and.reduce([np.isfinite(frame.to_numpy()).all(axis=1) for frame in watched])
     for name in reversed(KEY):
         runs.insert(0, name, key[name])
+    runs = runs.assign(**{name: key[name] for name in DESIGN})
     return runs.reset_index(), curve
 
 
@@ -87,7 +88,7 @@ def runs_frame(blocks: Iterable[Block]) -> pd.DataFrame:
     if runs.duplicated([*KEY, "seed"]).any():
         twice = runs.loc[runs.duplicated([*KEY, "seed"]), [*KEY, "seed"]].iloc[0].to_list()
         raise ValueError(f"run given twice: {twice}")
-    runs = runs.astype({"budget": "int64", "seed": "int64", "alpha0": float, "diverged": bool})
+    runs = runs.astype({"budget": "int64", "seed": "int64", "alpha0": float, "diverged": bool, "horizon": float})
     return runs.sort_values([*KEY, "seed"], ignore_index=True)[RUNS]
 
 
@@ -124,7 +125,7 @@ def _cell(runs: pd.DataFrame) -> dict[str, Any]:
             episodes = int(runs["episodes"].iloc[0])
             summary["_low"], summary["_high"] = stats.wilson_interval(round(summary[""] * episodes), episodes)
         row |= {name + suffix: value for suffix, value in summary.items()}
-    return row
+    return row | {name: runs[name].iloc[0] for name in DESIGN}
 
 
 def cells_frame(runs: pd.DataFrame) -> pd.DataFrame:

@@ -5,7 +5,8 @@ import pandas as pd
 
 from reacher_shaping import stats
 from reacher_shaping.analysis.comparisons import partner
-from reacher_shaping.labels import KEY, group
+from reacher_shaping.analysis.correlation import in_paper
+from reacher_shaping.labels import DESIGN, KEY
 
 METRICS = ("success_rate", "final_success_rate", "mean_return")
 THRESHOLDS = tuple(round(0.02 * step, 2) for step in range(51))
@@ -18,11 +19,12 @@ def scores_frame(runs: pd.DataFrame) -> pd.DataFrame:
     (chance that a run beats one of `none` at the same budget), improvement_low, improvement_high; the last three are
     missing for `none` and where there is no such cell.
     """
-    cells = runs[KEY].drop_duplicates()
+    cells = runs[[*KEY, *DESIGN]].drop_duplicates()
+    design = {tuple(cell[name] for name in KEY): cell for cell in cells.to_dict("records")}
     by_cell = {tuple(key): own.set_index("seed") for key, own in runs.groupby(KEY)}
     rows = []
     for key, own in by_cell.items():
-        other = partner("none", dict(zip(KEY, key, strict=True)), cells)
+        other = partner("none", design[key], cells)
         none = by_cell.get(tuple(other[name] for name in KEY)) if other else None
         for metric in METRICS:
             sample = own[metric]
@@ -36,12 +38,15 @@ def scores_frame(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def profiles_frame(runs: pd.DataFrame) -> pd.DataFrame:
-    """`profiles.parquet`: share of the runs of a group of variants whose success is above a threshold.
+    """`profiles.parquet`: share of the runs of a kind of variants whose success is above a threshold.
 
-    Columns: protocol, group, budget, threshold, seeds, share, share_low, share_high. A seed's share is over the group's
+    The paper's cells alone count. In `group` their kind: `none`, `constant`, `decay`, or `decay_l2sq`, the appendix's.
+    Columns: protocol, group, budget, threshold, seeds, share, share_low, share_high. A seed's share is over the kind's
     cells, so the limits are t limits over seeds, ending at 0 and 1.
     """
-    named = runs.assign(group=runs["variant"].map(group))
+    paper = runs[in_paper(runs)]
+    kinds = [paper["variant"] == "none", paper["schedule"] == "constant", paper["group"] == "appendix"]
+    named = paper.assign(group=np.select(kinds, ["none", "constant", "decay_l2sq"], "decay"))
     rows = []
     for key, own in named.groupby(["protocol", "group", "budget"]):
         for threshold in THRESHOLDS:

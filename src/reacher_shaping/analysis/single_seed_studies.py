@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from reacher_shaping import stats
 from reacher_shaping.analysis.claim_formulas import BEST, LONG, SHAPED, SHORT, TABLE_2
 from reacher_shaping.labels import CELL
+from reacher_shaping.paper_variants import VARIANTS
 
 Array = NDArray[np.float64]
 CORRELATIONS = ["r_alpha_return", "r_success_return", "r_success_budget"]
@@ -21,6 +22,7 @@ INDEX = {cell: column for column, cell in enumerate(TABLE_2)}
 NONE = {budget: INDEX["none", budget, 1.0] for budget in (SHORT, LONG)}
 SHAPED_COLUMNS = [INDEX[cell] for cell in SHAPED]
 BASELINES = [NONE[cell[1]] for cell in SHAPED]
+DECAYED = [column for cell, column in INDEX.items() if VARIANTS[cell[0]].schedule == "linear"]
 HALF = [INDEX[cell] for cell in SHAPED if cell[2] == 0.5]
 FULL = [INDEX[cell[0], SHORT, 1.0] for cell in SHAPED if cell[2] == 0.5]
 
@@ -32,7 +34,7 @@ def _gain(success: Array, variant: str) -> Array:
 # Statement -> which studies [B] it comes out in, given success rates [B, 17].
 STATEMENTS: dict[str, Callable[[Array], NDArray[np.bool_]]] = {
     "decay300k at 1M is the best cell": lambda s: s.argmax(axis=1) == INDEX[BEST],
-    "a decayed cell is the best": lambda s: np.isin(s.argmax(axis=1), [i for c, i in INDEX.items() if c[0][0] == "d"]),
+    "a decayed cell is the best": lambda s: np.isin(s.argmax(axis=1), DECAYED),
     "no shaping is the best": lambda s: np.isin(s.argmax(axis=1), list(NONE.values())),
     "the best cell more than doubles `none` at 1M": lambda s: s.max(axis=1) > 2 * s[:, NONE[LONG]],
     "13 or more of 15 shaped cells are above `none`": lambda s: (

@@ -21,7 +21,7 @@ import pandas as pd
 
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
-from reacher_shaping.analysis.correlation import correlations, in_table_2
+from reacher_shaping.analysis.correlation import correlations, in_paper, in_table_2
 from reacher_shaping.labels import KEY
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.parts import Switches
@@ -111,9 +111,8 @@ def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str) ->
     """
     labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
     kept = runs[in_table_2(runs) & ~labelled]
-    levels = {"cells": kept, "runs": kept, "cells_all": runs}
+    levels = {"cells": kept, "runs": kept, "cells_all": runs[in_paper(runs)]}
     levels["published"] = published[in_table_2(published)].assign(seed=0)
     levels |= {f"seed{seed}": rows for seed, rows in kept.groupby("seed")}
-    return pd.concat([correlations(rows, level) for level, rows in levels.items()], ignore_index=True).assign(
-        protocol=name
-    )
+    parts = [correlations(rows, level) for level, rows in levels.items() if len(rows)]
+    return pd.concat(parts, ignore_index=True).assign(protocol=name)

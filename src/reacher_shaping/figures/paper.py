@@ -38,7 +38,7 @@ from reacher_shaping.labels import (
     variant_order,
 )
 
-FAMILIES = {"constant": "Constant shaping", "decay": "Decayed shaping"}
+FAMILIES = {"constant": "Constant shaping", "linear": "Decayed shaping"}
 MEASURES = {"alpha0": "α₀", "success_rate": "success\nrate", "mean_return": "mean\nreturn", "budget": "budget"}
 FILLS = (0.45, 1.0, 0.0, 0.25)
 """Strength of the bars' colour by budget and alpha0, full alpha0 first; the outline of the others is dashed."""
@@ -51,15 +51,18 @@ def figure_1(curves: pd.DataFrame, protocol: str | None = None) -> Figure:
     `curves` as `learning_curves.curve_table` gives it. The unshaped reference `none` is drawn wherever the
     study has it; a dashed line marks the highest point of a panel's mean curves.
     """
-    main = in_groups(of_protocol(curves, protocol), ("none", "constant", "decay"))
-    rows = [in_groups(main, ("none", family)).assign(family=title) for family, title in FAMILIES.items()]
+    main = in_groups(of_protocol(curves, protocol), ["main"])
+    rows = [
+        main[(main["variant"] == "none") | (main["schedule"] == schedule)].assign(family=title)
+        for schedule, title in FAMILIES.items()
+    ]
     return _training_curves(pd.concat(rows), list(FAMILIES.values()), share_y="col")
 
 
 @look()
 def figure_4(curves: pd.DataFrame, protocol: str | None = None) -> Figure:
     """Training curves of decay with the L2-squared potential, a panel per budget and alpha0."""
-    part = in_groups(of_protocol(curves, protocol), ("decay_l2sq",))
+    part = in_groups(of_protocol(curves, protocol), ["appendix"])
     return _training_curves(part.assign(family="Decay, L2²"), ["Decay, L2²"], share_y=True)
 
 
@@ -135,8 +138,8 @@ def figure_2(
     ours = ours.merge(published[[*CELL, "success_rate"]], "left", CELL, suffixes=("", "_published"))
     settings = [setting_label(*setting) for setting in settings_of(ours)]
     sides = {
-        "Main grid": in_groups(ours, ("none", "constant", "decay")),
-        "Decay with L2²": in_groups(ours, ("decay_l2sq",)),
+        "Main grid": in_groups(ours, ["main"]),
+        "Decay with L2²": in_groups(ours, ["appendix"]),
     }
     figure = Figure(figsize=(11.5, 4.3))
     widths = [max(len(side), 4) if len(side) else 2 for side in sides.values()]

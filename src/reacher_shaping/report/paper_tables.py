@@ -20,7 +20,6 @@ from reacher_shaping.report.text import entry, say
 from reacher_shaping.storage.files import write_text
 
 MEASURED = ("success_rate", "mean_return", "final_success_rate", "final_distance")
-MAIN_GRID = ("none", "constant", "decay")
 BUDGETS = {"500K": 500_000, "1M": 1_000_000}
 BEHAVIOUR = (
     "final_success_rate",
@@ -49,17 +48,17 @@ FORMATS = {
 def published_cells(table2: pd.DataFrame, table3: pd.DataFrame, left_out: pd.DataFrame | None = None) -> pd.DataFrame:
     """The paper's Tables 2 and 3 under our cell keys, and the run they leave out where it is given.
 
-    Result: `variant, budget, alpha0, run, success_rate, mean_return`. Table 3 calls its variants
+    Result: `variant, budget, alpha0, run, success_rate, mean_return, group`. Table 3 calls its variants
     `decay200K` and so on too, but shapes with the squared distance.
     """
     frames = []
-    for table, suffix in ((table2, ""), (table3, "_l2sq"), (left_out, "")):
+    for table, suffix, group in ((table2, "", "main"), (table3, "_l2sq", "appendix"), (left_out, "", "main")):
         if table is None:
             continue
         frame = table.rename(columns={"alpha": "alpha0"}).astype({"alpha0": float})
         frame["variant"] = frame["variant_base"].str.lower() + suffix
         frame["budget"] = frame["num_episodes"].map(BUDGETS)
-        frames.append(frame[[*CELL, "run", "success_rate", "mean_return"]])
+        frames.append(frame[[*CELL, "run", "success_rate", "mean_return"]].assign(group=group))
     return pd.concat(frames, ignore_index=True)
 
 
@@ -74,22 +73,20 @@ def table_2(cells: pd.DataFrame, published: pd.DataFrame, protocol: str | None =
     Columns: `rank, variant, budget, alpha0, seeds, diverged`, then each measure with `_low` and
     `_high`, then `published_success_rate, published_mean_return, published_rank`.
     """
-    return _ranked(cells, published, protocol, MAIN_GRID)
+    return _ranked(cells, published, protocol, "main")
 
 
 def table_3(cells: pd.DataFrame, published: pd.DataFrame, protocol: str | None = None) -> pd.DataFrame:
     """Every decay cell with the L2-squared potential, best success rate first; columns as `table_2`."""
-    return _ranked(cells, published, protocol, ("decay_l2sq",))
+    return _ranked(cells, published, protocol, "appendix")
 
 
-def _ranked(
-    cells: pd.DataFrame, published: pd.DataFrame, protocol: str | None, groups: tuple[str, ...]
-) -> pd.DataFrame:
-    """Cells of the groups, joined with the published rows, ranked by success rate."""
-    ours = in_groups(of_protocol(cells, protocol), groups)
-    theirs = in_groups(published, groups)
+def _ranked(cells: pd.DataFrame, published: pd.DataFrame, protocol: str | None, group: str) -> pd.DataFrame:
+    """Cells of a group, joined with the published rows, ranked by success rate."""
+    ours = in_groups(of_protocol(cells, protocol), [group])
+    theirs = in_groups(published, [group])
     theirs = theirs.assign(rank=theirs["success_rate"].rank(ascending=False, method="min"))
-    theirs = theirs.drop(columns="run").set_index(CELL).add_prefix("published_").reset_index()
+    theirs = theirs.drop(columns=["run", "group"]).set_index(CELL).add_prefix("published_").reset_index()
     measures = [f"{name}{end}" for name in MEASURED for end in ("", "_low", "_high")]
     table = ours[[*CELL, "seeds", "diverged", *measures]].merge(theirs, on=CELL, how="left")
     table = table.sort_values(["success_rate", *CELL], ascending=[False, True, True, True], ignore_index=True)

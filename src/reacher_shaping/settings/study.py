@@ -10,12 +10,12 @@ import hashlib
 import json
 from collections.abc import Mapping
 from functools import cached_property
-from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from reacher_shaping.paper_variants import VARIANTS
 from reacher_shaping.settings.base import (
     WHOLE,
     ConfigError,
@@ -24,11 +24,11 @@ from reacher_shaping.settings.base import (
     Settings,
     first_problem,
     flat,
-    short,
 )
 from reacher_shaping.settings.cell import Cell, Protocol, Variant
+from reacher_shaping.settings.grid import Known, Placed, placed
 from reacher_shaping.settings.inheritance import resolved
-from reacher_shaping.settings.parts import Evaluation, Experiment, Peers, Row, Rows, Switches
+from reacher_shaping.settings.parts import Evaluation, Experiment, Peers, Rows
 from reacher_shaping.settings.search import Search
 from reacher_shaping.settings.yaml_file import merged, read_mapping
 
@@ -43,6 +43,7 @@ PEER_PPO: dict[str, Any] = {
     "initial_log_std": 0.0,
 }
 """What Stable-Baselines3's PPO has for the settings that are not handed over to it (`sb3_baselines.train`)."""
+MAIN = "main"
 RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
 
 
@@ -93,6 +94,7 @@ class Study(Settings):
 
     @model_validator(mode="after")
     def _grid_is_possible(self) -> Self:
+        self._variants_are_those_of_their_names()
         for entries, kind in ((self.protocols, "protocols"), (self.variants, "variants")):
             for name, entry in entries.items():
                 if entry.name != name:
@@ -100,13 +102,15 @@ class Study(Settings):
         for name in self.protocols:
             if name in RESERVED_FOLDERS:
                 raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
+        if MAIN in self.experiments:
+            raise ValueError(f"experiments: {MAIN!r} is the study beside it; allowed: any other name")
         for name, experiment in self.experiments.items():
             self._peers_have_partners(name, experiment)
         self._search_is_possible()
         known: dict[str, Cell] = {}
-        for where, cells in {"grid": self.cells, **self.experiment_cells}.items():
-            names = [cell.name for cell in cells]
-            for cell in cells:
+        for name, own in self.designs.items():
+            where, names = "grid" if name == MAIN else name, [cell.name for cell, _ in own]
+            for cell, _ in own:
                 if names.count(cell.name) > 1:
                     raise ValueError(
                         f"{where}: cell {cell.name} is there {names.count(cell.name)} times; allowed: once"
@@ -117,6 +121,17 @@ class Study(Settings):
                         "allowed: the same, or a protocol of another name"
                     )
         return self
+
+    def _variants_are_those_of_their_names(self) -> None:
+        """A name of the paper's tables stands for what the paper calls so: labels and published values go by it."""
+        for name, own in self.variants.items():
+            paper = VARIANTS.get(name)
+            for key in ("potential", "schedule", "horizon") if paper else ():
+                if getattr(own, key) != getattr(paper, key):
+                    raise ValueError(
+                        f"variants.{name}.{key} = {getattr(own, key)!r} is not that of the paper's {name}; "
+                        f"allowed: {getattr(paper, key)!r}, or another name"
+                    )
 
     def _peers_have_partners(self, name: str, experiment: Experiment) -> None:
         """Peers are held against the unshaped cells of the experiment's first protocol, and have its settings."""
@@ -153,78 +168,38 @@ class Study(Settings):
                 raise ValueError(str(error)) from None
 
     @cached_property
+    def studies(self) -> dict[str, Experiment]:
+        """The main study, under the name `main`, and the further ones."""
+        main = Experiment(title=self.title, question=self.question, seeds=self.seeds, grid=self.grid)
+        return {MAIN: main, **self.experiments}
+
+    @cached_property
+    def designs(self) -> dict[str, tuple[Placed, ...]]:
+        """The cells of each study, in the order of its grid, each with its group."""
+        known = Known(self.protocols, self.variants, self.root_seed)
+        return {name: placed(study, known, where=_place(name)) for name, study in self.studies.items()}
+
+    @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """The cells of the main study, in the order of the grid."""
-        return self._cells_of_rows("grid", self.grid)
+        return tuple(cell for cell, _ in self.designs[MAIN])
 
     @cached_property
     def experiment_cells(self) -> dict[str, tuple[Cell, ...]]:
         """The cells of each further study, by its name; some may be another's or the main study's too."""
-        return {name: self._experiment_cells(name, experiment) for name, experiment in self.experiments.items()}
+        return {name: tuple(cell for cell, _ in self.designs[name]) for name in self.experiments}
 
-    def _experiment_cells(self, name: str, experiment: Experiment) -> tuple[Cell, ...]:
-        cells = self._cells_of_rows(f"experiments.{name}.grid", experiment.grid)
-        switches, root = experiment.switches, experiment.root_seed
-        if switches is not None:
-            cells += self._switched_cells(switches, f"experiments.{name}.switches")
-        return cells if root is None else tuple(cell.model_copy(update={"root_seed": root}) for cell in cells)
-
-    def _switched_cells(self, switches: Switches, where: str) -> tuple[Cell, ...]:
-        for key, value in (("start", switches.start), ("end", switches.end)):
-            if value not in self.protocols:
-                raise ValueError(f"{where}.{key} = {value!r} is unknown; allowed: {', '.join(self.protocols)}")
-        start, end = (self.protocols[name].model_dump() for name in (switches.start, switches.end))
-        protocols = [start, end]
-        for switch, paths in switches.settings.items():
-            for base, other, word in ((start, end, "with"), (end, start, "without")):
-                if word == "with" and not switches.alone:
-                    continue
-                name = f"{base['name']}_{word}_{switch}"
-                protocols.append(_switched(base, other, paths, f"{where}.settings.{switch}") | {"name": name})
-        try:
-            return tuple(
-                self._cell(
-                    Protocol.model_validate(protocol),
-                    variant,
-                    switches.budget,
-                    1.0 if variant == "none" else switches.alpha0,
-                    where,
-                )
-                for protocol in protocols
-                for variant in switches.variants
-            )
-        except ValidationError as error:
-            raise ValueError(f"{where}.{first_problem(error)}") from None
-
-    def _cell(self, protocol: Protocol, variant: str, budget: int, alpha0: float, where: str) -> Cell:
-        if variant not in self.variants:
-            raise ValueError(f"{where}.variants = {variant!r} is unknown; allowed: {', '.join(self.variants)}")
-        return Cell(
-            protocol=protocol, variant=self.variants[variant], budget=budget, alpha0=alpha0, root_seed=self.root_seed
-        )
-
-    def _cells_of_rows(self, where: str, rows: tuple[Row, ...]) -> tuple[Cell, ...]:
-        return tuple(
-            cell
-            for number, row in enumerate(rows)
-            for protocol in ([row.protocol] if isinstance(row.protocol, str) else row.protocol)
-            for cell in self._cells_of(f"{where}.{number}", row, protocol)
-        )
-
-    def _cells_of(self, where: str, row: Row, name: str) -> list[Cell]:
-        if name not in self.protocols:
-            raise ValueError(f"{where}.protocol = {name!r} is unknown; allowed: {', '.join(self.protocols)}")
-        protocol = self.protocols[name].model_dump()
-        for part in ("environment", "ppo", "shaping", "log"):
-            protocol[part] |= getattr(row, part)
-        try:
-            changed = Protocol.model_validate(protocol)
-            return [
-                self._cell(changed, variant, budget, alpha0, where)
-                for variant, budget, alpha0 in product(row.variants, row.budgets, row.alpha0)
-            ]
-        except ValidationError as error:
-            raise ValueError(f"{where}.{first_problem(error)}".replace("..", ".")) from None
+    def design(self, name: str) -> list[dict[str, Any]]:
+        """The columns that each cell of a study has in its tables: the cell's key, and what the cell is for."""
+        return [
+            {
+                **cell.key,
+                "study": name,
+                "group": group,
+                **cell.variant.model_dump(include={"potential", "schedule", "horizon"}),
+            }
+            for cell, group in self.designs[name]
+        ]
 
     def radius_of(self, cell: Cell) -> float:
         """Return the distance to the goal in m that counts as success for a cell."""
@@ -239,19 +214,9 @@ class Study(Settings):
         return tuple(range(first, min(first + size, count)) for first in range(0, count, size))
 
 
-def _switched(base: dict[str, Any], other: Mapping[str, Any], paths: tuple[str, ...], where: str) -> dict[str, Any]:
-    """The settings `base` with those at the dotted `paths` taken from `other`. Raises ValueError."""
-    changed = {part: dict(value) if isinstance(value, Mapping) else value for part, value in base.items()}
-    for path in paths:
-        part, _, key = path.partition(".")
-        if not isinstance(other.get(part), Mapping) or key not in other[part]:
-            raise ValueError(f"{where} = {path!r} is no setting of a protocol; allowed: such as 'ppo.learning_rate'")
-        if other[part][key] == base[part][key]:
-            raise ValueError(
-                f"{where} = {path!r} is {short(base[part][key])} at both ends; allowed: a setting that differs"
-            )
-        changed[part][key] = other[part][key]
-    return changed
+def _place(study: str) -> str:
+    """Where a study stands in the configuration, as the begin of a dotted path."""
+    return "" if study == MAIN else f"experiments.{study}."
 
 
 def block_name(seeds: range) -> str:

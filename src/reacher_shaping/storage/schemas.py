@@ -2,9 +2,11 @@
 
 from reacher_shaping.storage.block_schemas import FLAG, INTEGER, LENGTH, NUMBER, TEXT, Table
 
+_DESIGN = {"study": TEXT, "group": TEXT, "potential": TEXT, "schedule": TEXT, "horizon": NUMBER}
+_HORIZON = frozenset({"horizon"})
 _CELL = {"protocol": TEXT, "variant": TEXT, "budget": INTEGER, "alpha0": NUMBER}
-RUNS = Table({**_CELL, "seed": INTEGER, "episodes": INTEGER, "diverged": FLAG}, measures=True)
-CELLS = Table({**_CELL, "seeds": INTEGER, "diverged": INTEGER, "interval": TEXT}, measures=True)
+RUNS = Table({**_CELL, "seed": INTEGER, "episodes": INTEGER, "diverged": FLAG, **_DESIGN}, _HORIZON, measures=True)
+CELLS = Table({**_CELL, "seeds": INTEGER, "diverged": INTEGER, "interval": TEXT, **_DESIGN}, _HORIZON, measures=True)
 CORRELATION = Table(
     {"method": TEXT, "x": TEXT, "y": TEXT, "r": NUMBER, "ci_low": NUMBER, "ci_high": NUMBER, "n": INTEGER}
     | {"level": TEXT, "protocol": TEXT},
@@ -12,8 +14,8 @@ CORRELATION = Table(
 )
 CURVES = Table(
     {**_CELL, "iteration": INTEGER, "env_steps": INTEGER, "episode_return": NUMBER, "low": NUMBER, "high": NUMBER}
-    | {"seeds": INTEGER},
-    optional=frozenset({"episode_return", "low", "high"}),
+    | {"seeds": INTEGER, **_DESIGN},
+    optional=frozenset({"episode_return", "low", "high"}) | _HORIZON,
 )
 _NUMBERS = {"published", "measured", "ci_low", "ci_high", "replication", "power", "refuted_if_true"}
 _WORTH = {"dated": TEXT, "replication": NUMBER, "interval_verdict": TEXT, "seeds_to_decide": NUMBER}
