@@ -229,6 +229,13 @@ def test_a_label_may_be_given_to_the_baseline():
         ("variants.l2.horizon", 200_000, ["variants.l2.horizon = 200000", "constant"]),
         ("variants.decay200k.horizon", None, ["variants.decay200k.horizon", "missing", ">= 1"]),
         ("variants.none.schedule", "linear", ["variants.none", "horizon"]),
+        ("variants.decay300k.horizon", 250_000, ["decay300k.horizon = 250000", "not that of the paper's", "300000"]),
+        ("grid.2.group", "main", ["grid.2.variants = 'decay200k_l2sq'", "group main", "decay500k, or without group"]),
+        (
+            "experiments.main",
+            {"seeds": 1, "grid": [{"variants": ["none"], "budgets": [4096]}]},
+            ["'main'", "other name"],
+        ),
         ("variants.l2.potential", "l3", ["variants.l2.potential = 'l3'", "'none', 'l2' or 'l2sq'"]),
         ("variants.l2; rm -rf", {"potential": "l2"}, ["l2; rm -rf", "pattern"]),
         ("variants.l2", None, ["variants.l2 = None", "mapping"]),
@@ -242,6 +249,34 @@ def test_impossible_value_is_refused_in_one_line(path, value, words):
     assert "\n" not in message
     for word in words:
         assert word in message
+
+
+def test_a_renamed_variant_of_the_paper_is_refused_and_not_left_untested():
+    config = copy.deepcopy(DEFAULT)
+    config["variants"]["slow"] = config["variants"].pop("decay300k")
+    rows = [row for study in [config, *config["experiments"].values()] for row in study.get("grid", [])]
+    for row in rows:
+        row["variants"] = ["slow" if name == "decay300k" else name for name in row["variants"]]
+    message = refusal(config)
+    assert "grid.0.variants = 'slow' is no variant of the paper's group main" in message
+    assert "decay300k" in message
+    assert "without group" in message
+
+
+def test_cells_are_what_their_study_declares():
+    config = changed("variants.slow", {"potential": "l2", "schedule": "linear", "horizon": 700_000})
+    config["grid"].append({"variants": ["slow"], "budgets": [500_000]})
+    study = load_study(config)
+    design = {cell["variant"]: cell for cell in study.design("main") if cell["budget"] == 500_000}
+    columns = ("study", "group", "potential", "schedule", "horizon")
+    found = {name: tuple(design[name][column] for column in columns) for name in ("none", "decay300k_l2sq", "slow")}
+    assert found == {
+        "none": ("main", "main", "none", "constant", None),
+        "decay300k_l2sq": ("main", "appendix", "l2sq", "linear", 300_000),
+        "slow": ("main", "extra", "l2", "linear", 700_000),
+    }
+    assert {cell["group"] for cell in study.design("attribution")} == {"extra"}
+    assert {cell["study"] for cell in study.design("released")} == {"released"}
 
 
 def test_missing_key_is_named():

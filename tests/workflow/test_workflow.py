@@ -16,8 +16,8 @@ TINY = {
     "seeds_per_block": 1,
     "evaluation": {"episodes": 20, "radius": 0.02},
     "grid": [
-        {"variants": ["none"], "budgets": [2048]},
-        {"variants": ["decay200k_l2sq"], "budgets": [2048], "alpha0": [0.5]},
+        {"group": "main", "variants": ["none"], "budgets": [2048]},
+        {"group": "appendix", "variants": ["decay200k_l2sq"], "budgets": [2048], "alpha0": [0.5]},
     ],
 }
 FURTHER = {

@@ -72,7 +72,7 @@ def comparison_frame(runs: pd.DataFrame, metrics: Sequence[str] = METRICS) -> pd
     Columns: family, metric, the cell's key, `other_variant, other_budget, other_alpha0`, difference, ci_low, ci_high,
     p, p_holm, improvement (probability that a run of the cell beats one of the other; for `final_distance` smaller is
     better), improvement_low, improvement_high, seeds, family_low, family_high (limits of the difference that hold for
-    all comparisons of the family and metric at once).
+    all comparisons of the family and metric at once), group (of the cell).
     """
     cells = runs[[*KEY, *DESIGN]].drop_duplicates()
     paper = cells[cells["group"] != "extra"]
@@ -85,14 +85,15 @@ def comparison_frame(runs: pd.DataFrame, metrics: Sequence[str] = METRICS) -> pd
         sizes = Counter((key["protocol"], key["group"] == "extra") for key, _ in pairs)
         for key, other in pairs:
             ours, theirs = (by_cell[tuple(which[name] for name in KEY)] for which in (key, other))
-            extra = key["group"] == "extra"
+            among = sizes[key["protocol"], key["group"] == "extra"]
             named = {name: key[name] for name in KEY} | {f"other_{name}": other[name] for name in KEY[1:]}
             for metric in metrics:
                 better = -1 if metric.endswith("distance") else 1
-                compared = _compare(ours[metric], theirs[metric], better, among=sizes[key["protocol"], extra])
-                rows.append({"family": family, "metric": metric, "extra": extra} | named | compared)
-    columns = ["family", "metric", "extra", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED]
+                compared = _compare(ours[metric], theirs[metric], better, among)
+                rows.append({"family": family, "metric": metric} | named | compared | {"group": key["group"]})
+    columns = ["family", "metric", *KEY, "other_variant", "other_budget", "other_alpha0", *COMPARED, "group"]
     frame = pd.DataFrame(rows, columns=[name for name in columns if name != "p_holm"])
+    frame["extra"] = frame["group"] == "extra"
     return stats.with_holm(frame, ["protocol", "family", "metric", "extra"]).drop(columns="extra")
 
 

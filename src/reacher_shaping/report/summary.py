@@ -4,14 +4,14 @@ Everything is made from the study's tables; no number stands in a sentence here.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from reacher_shaping.analysis.comparisons import corrected
-from reacher_shaping.labels import CELL, number, of_protocol, stochastic
+from reacher_shaping.labels import CELL, in_groups, number, of_protocol, stochastic
 from reacher_shaping.report.loader import Study
 from reacher_shaping.report.quantities import shown, with_interval
 from reacher_shaping.report.small_pictures import Bar
@@ -46,7 +46,8 @@ class Summary:
 
 
 def summary(study: Study, protocol: str | None = None) -> Summary:
-    """The first screen of a study; what its tables do not tell is left out."""
+    """The first screen of a study; what its tables do not tell is left out, and so are cells that the paper lacks."""
+    study = _of_paper(study)
     cells = of_protocol(study.tables["cells"], protocol)
     if cells.empty:
         return Summary(say("summary.nothing"), [], [], [], [], [])
@@ -62,6 +63,19 @@ def summary(study: Study, protocol: str | None = None) -> Summary:
         why(study, protocol),
         bars(study, protocol),
     )
+
+
+def _of_paper(study: Study) -> Study:
+    """The study with its cells that the paper has; a study without any is left as it is."""
+
+    def kept(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+        chosen = {
+            name: in_groups(tables[name], ["main", "appendix"]) for name in ("cells", "comparisons") if name in tables
+        }
+        return {**tables, **({} if chosen["cells"].empty else chosen)}
+
+    experiments = {name: kept(tables) for name, tables in study.experiments.items()}
+    return replace(study, tables=kept(study.tables), experiments=experiments)
 
 
 def _span(counts: Sequence[int]) -> str:

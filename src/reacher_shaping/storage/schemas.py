@@ -45,7 +45,7 @@ RUN_RADII = Table({**_CELL, "seed": INTEGER, "mode": TEXT, "radius": NUMBER}, me
 RADII = Table({**_CELL, "mode": TEXT, "radius": NUMBER, "seeds": INTEGER}, measures=True)
 COMPARISONS = Table(
     {"family": TEXT, "metric": TEXT, **_CELL, "other_variant": TEXT, "other_budget": INTEGER, "other_alpha0": NUMBER}
-    | {"seeds": INTEGER},
+    | {"seeds": INTEGER, "group": TEXT},
     measures=True,
 )
 PEERS = Table({"algorithm": TEXT, "seed": INTEGER, "budget": INTEGER}, measures=True)
