@@ -131,7 +131,7 @@ def variance_frame(runs: pd.DataFrame) -> pd.DataFrame:
         row |= {"seed_variance": seed, "evaluation_variance": evaluation}
         rate = stats.mean(own["success_rate"])
         rows.append(row | {"resets_deviation": np.sqrt(rate * (1 - rate) / episodes) if episodes else np.nan})
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=[*KEY, "seeds", "seed_variance", "evaluation_variance", "resets_deviation"])
 
 
 def power_frame(runs: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
