@@ -13,6 +13,10 @@ PLUGIN := $(if $(findstring slurm,$(PROFILE)),python -c 'import snakemake_execut
 SNAKEMAKE := snakemake --workflow-profile $(PROFILE) $(if $(VERBOSE),--quiet host)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Where the home folder cannot be written, caches go into build/.
+ifneq ($(shell mkdir -p "$${XDG_CACHE_HOME:-$$HOME/.cache}" 2> /dev/null && test -w "$${XDG_CACHE_HOME:-$$HOME/.cache}" && echo yes),yes)
+export XDG_CACHE_HOME := $(CURDIR)/build/cache
+endif
 
 .DEFAULT_GOAL := help
 .PHONY: help setup reproduce quick plan cells restore report compare check-bits archive verify reference test test-fast check lock bench peers clean
@@ -23,6 +27,9 @@ help: ## what each target does
 setup: $(READY) ## the virtual environment .venv with pinned packages
 
 $(READY): pyproject.toml requirements.txt workflow/install.py
+	@case "$$(pwd)" in *[[:space:]\'\"\$$\`\\\;\&\|\<\>\(\)\{\}\[\]\*\?\!\#:]*) \
+		echo "$$(pwd): Snakemake starts no job from a folder with a space, a quote or the like in its path; move the clone" >&2; \
+		exit 1;; esac
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; name one: make PYTHON=python3.12")'
 	$(BIN)/python -m pip --version > /dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python workflow/install.py $(if $(ANY_TORCH),--any-torch)

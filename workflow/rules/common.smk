@@ -16,6 +16,10 @@ from reacher_shaping.settings.yaml_file import merged
 from reacher_shaping.storage.code_hash import code_hash
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES, made_by, read_by
 
+UNFIT = set(" \t'\"$`\\;&|<>(){}[]*?!#") & set(sys.executable)  # Snakemake starts scripts by a shell, unquoted
+if UNFIT:
+    sys.exit(f"{sys.executable}: Snakemake starts no job by a Python with {min(UNFIT)!r} in its path; move the clone")
+
 
 def or_stop(read):
     """What `read` makes of the settings; where they are wrong, end with its one line and no traceback."""

@@ -14,7 +14,7 @@ from reacher_shaping.storage import block_schemas
 from reacher_shaping.storage.code_hash import reached_files
 from reacher_shaping.storage.files import write_json, write_monitors, write_table
 from reacher_shaping.storage.policy_format import weights_checksum, write_policy
-from reacher_shaping.storage.provenance import Record
+from reacher_shaping.storage.provenance import Record, exact_versions
 from reacher_shaping.tasks.base import load_task
 
 RADIUS = 0.02
@@ -25,7 +25,9 @@ params, output = snakemake.params, snakemake.output
 cell = Cell.model_validate_json(params.cell)
 task = load_task(cell.protocol.environment.task)
 block = Path(output.policy).parent
-key = hashlib.sha256(json.dumps([params.cell, params.seeds, params.code, kernels()]).encode()).hexdigest()[:16]
+key = hashlib.sha256(
+    json.dumps([params.cell, params.seeds, params.code, kernels(), exact_versions()]).encode()
+).hexdigest()[:16]
 radius = cell.protocol.environment.radius(RADIUS)
 settings = {"cell": cell.settings(), "radius": radius}
 

@@ -8,8 +8,11 @@ relative to it stay relative in what the notebook shows.
 
 import argparse
 import logging
+import os
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +39,24 @@ def clean(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     return notebook
 
 
+@contextmanager
+def _no_personal_settings(folder: Path) -> Iterator[None]:
+    """Meanwhile, kernels find no settings, start-up files or kernels of a person's: `folder` in place of the home's.
+
+    IPython would run its start-up files first, and Matplotlib draw by the person's matplotlibrc.
+    """
+    names = ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "MPLCONFIGDIR")
+    before = dict(os.environ)
+    for name in [name for name in os.environ if name.startswith(("JUPYTER", "IPYTHON", "MPL", "MATPLOTLIB"))]:
+        del os.environ[name]
+    os.environ.update({name: str(folder / name.lower()) for name in names})
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
 def execute(
     source: Path, out: Path, parameters: dict[str, Any], log: Path | None = None, working_folder: Path | None = None
 ) -> None:
@@ -43,7 +64,7 @@ def execute(
 
     A notebook that fails is kept, with its traceback, at `log`; the exception goes on to the caller.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, _no_personal_settings(Path(folder)):
         prepared, executed = Path(folder) / "prepared.ipynb", Path(folder) / "executed.ipynb"
         nbformat.write(jupytext.read(source), prepared)  # type: ignore[no-untyped-call]
         try:

@@ -4,7 +4,7 @@ Workflow RO-Crate 1.1 (https://w3id.org/workflowhub/workflow-ro-crate), written 
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from rocrate.model import ContextEntity
@@ -108,6 +108,9 @@ def checksums(path: Path) -> dict[str, str]:
         raise ArtifactError(path, f"is no crate of this project ({error!r})") from None
     if not all(isinstance(text, str) for pair in found.items() for text in pair):
         raise ArtifactError(path, "is no crate of this project")
+    outside = [name for name in found if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts]
+    if outside:
+        raise ArtifactError(path, f"lists {outside[0]}, which is no file of the study")
     return found
 
 

@@ -55,6 +55,11 @@ def versions() -> dict[str, str]:
     }
 
 
+def exact_versions() -> dict[str, str]:
+    """Versions of the packages that the bits of a run hang on."""
+    return {name: metadata.version(name) for name in sorted(EXACT)}
+
+
 def machine() -> dict[str, Any]:
     """CPU model, number of cores this process may use, and system."""
     return {"cpu": _cpu(), "cores": len(os.sched_getaffinity(0)), "system": f"{platform.system()} {platform.release()}"}
