@@ -64,6 +64,7 @@ rule all:
         [path for name in MADE for path in runs_of(name)],
         MADE_FIGURES,
         "report/report.html",
+        "report/report.pdf",
         CRATE,
 
 

@@ -8,6 +8,7 @@ import synthetic
 from matplotlib.figure import Figure
 
 from reacher_shaping.analysis import comparisons, single_seed_studies
+from reacher_shaping.analysis.scores import scores_frame
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import html, loader
 
@@ -42,7 +43,7 @@ def make(folder, study, grid, seeds, **changes):
         "power": comparisons.power_frame(runs, synthetic.published()), "variance": comparisons.variance_frame(runs),
         "comparisons": comparisons.comparison_frame(runs), "peers": synthetic.peers(),
         "winners": single_seed_studies.winners_frame(studies), "spread": single_seed_studies.spread_frame(studies),
-        "claims": synthetic.claims(), "claim_parts": synthetic.claim_parts(),
+        "claims": synthetic.claims(), "claim_parts": synthetic.claim_parts(), "scores": scores_frame(runs),
     }  # fmt: skip
     kept = changes.pop("only", tables)
     tables = {name: table for name, table in tables.items() if name in kept}

@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+import shutil
 from pathlib import Path
 
 import jupytext
@@ -49,9 +50,10 @@ def study(tmp_path_factory):
     radii, lengths = (synthetic.over(grid, 2, *more) for more in (("radius", (0.01, 0.02)), ("steps", (50, 100))))
     write_table(results / "radii.parquet", radii, schemas.RADII)
     write_table(results / "lengths.parquet", lengths, schemas.LENGTHS)
-    (folder / "published").mkdir()
+    (folder / "report" / "published").mkdir(parents=True)
+    shutil.copy(synthetic.PUBLISHED.parent / "claims.yaml", folder / "report")
     for name in ("table2.csv", "table3.csv", "left_out.csv", "training_logs.csv"):
-        (folder / "published" / name).write_bytes((synthetic.PUBLISHED / name).read_bytes())
+        (folder / "report" / "published" / name).write_bytes((synthetic.PUBLISHED / name).read_bytes())
     return folder
 
 
@@ -73,7 +75,7 @@ def test_sources_define_nothing_and_say_their_language(source):
 @pytest.mark.parametrize(("name", "figures"), [("correlation", 1), ("further_views", 5)])
 def test_a_notebook_run_twice_gives_the_same_bytes(study, monkeypatch, name, figures):
     monkeypatch.chdir(study)
-    parameters = {"results": "results", "published": "published"}
+    parameters = {"results": "results", "published": "report/published"}
     source = next(path for path in SOURCES if path.stem == name)
     outs = [Path("out") / f"{number}.ipynb" for number in (1, 2)]
     for out in outs:

@@ -108,7 +108,7 @@ def test_paper_shows_whole_tables_and_opened_claims(visit):
 def test_tables_sort_by_keyboard_and_filter(visit):
     page = visit(WIDE)
     rows = page.locator("#table_2 tbody tr")
-    head = page.locator("#table_2 thead th", has_text="Rank").locator("button")
+    head = page.locator("#table_2").get_by_role("button", name="Rank", exact=True)
     head.focus()
     page.keyboard.press("Enter")
     page.wait_for_function("document.querySelector('#table_2 tbody td').textContent.trim() === '17'")

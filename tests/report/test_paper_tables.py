@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 import synthetic
 
+from reacher_shaping.analysis.scores import scores_frame
 from reacher_shaping.report import paper_tables
 
 
@@ -80,9 +81,9 @@ def test_markdown_reads_well(cells, published):
     )
     lines = text.splitlines()
     assert lines[0] == "What it shows."
-    row = next(line for line in lines if "| decay 300K, L2² | 1M |" in line)
+    row = next(line for line in lines if "| decay 300K, L2², 1M, α₀ = 0.5 |" in line)
     entries = [entry.strip() for entry in row.strip("|").split("|")]
-    assert entries[3:10] == ["0.5", "10", "0.250 [0.200, 0.304]", "0.207", "1", "-10.13 [-11.00, -9.00]", "-276.29"]
+    assert entries[2:8] == ["10", "25.0 [20.0, 30.4]", "20.7", "1", "-10.13 [-11.00, -9.00]", "-276.29"]
     assert entries[-1].startswith("45.6 [")
     assert len({line.count("|") for line in lines[2:]}) == 1
 
@@ -111,15 +112,15 @@ def test_behaviour_has_every_cell_by_variant_with_its_values(cells):
     shown = paper_tables.readable(
         cells.iloc[:1].assign(share_within_radius=0.0456, share_within_radius_low=float("nan"))
     )
-    assert shown["Share of steps within the radius"].tolist() == ["0.046"]
+    assert shown["Steps within the radius (%)"].tolist() == ["4.6"]
 
 
 def test_measure_that_an_older_table_lacks_is_left_out(cells):
     older = cells.drop(columns=[name for name in cells if "share_within_radius" in name])
     frame = paper_tables.readable(paper_tables.behaviour(older))
-    assert "Share of steps within the radius" not in frame
-    assert "Success at the last step" in frame
-    assert "Share of steps within the radius" in paper_tables.readable(paper_tables.behaviour(cells))
+    assert "Steps within the radius (%)" not in frame
+    assert "Success at the last step (%)" in frame
+    assert "Steps within the radius (%)" in paper_tables.readable(paper_tables.behaviour(cells))
 
 
 def test_learning_says_how_many_runs_reached_the_threshold(cells):
@@ -127,10 +128,10 @@ def test_learning_says_how_many_runs_reached_the_threshold(cells):
     slow = (runs["variant"] == "l2sq") & (runs["seed"] < 3)
     runs.loc[slow, "steps_to_threshold"] = float("nan")
     table = paper_tables.learning(synthetic.summary(runs), runs)
-    frame = paper_tables.readable(table).set_index("Variant")
-    assert set(frame.loc["L2²", "reached by"]) == {"7 of 10"}
-    assert set(frame.loc["none", "reached by"]) == {"10 of 10"}
-    assert frame.loc["L2²", "Steps to the threshold (thousands)"].iloc[0].startswith("115 [")  # 2.048 (50 + 6)
+    frame = paper_tables.readable(table).set_index("Setting")
+    assert frame.loc["L2², 1M, α₀ = 1", "reached by"] == "7 of 10"
+    assert frame.loc["none, 1M", "reached by"] == "10 of 10"
+    assert frame.loc["L2², 1M, α₀ = 1", "Steps to the threshold (thousands)"].startswith("115 [")  # 2.048 (50 + 6)
 
 
 def test_diverged_runs_are_counted_among_the_measures():
@@ -139,9 +140,26 @@ def test_diverged_runs_are_counted_among_the_measures():
         paper_tables.behaviour(synthetic.summary(runs)),
         paper_tables.learning(synthetic.summary(runs), runs),
     ):
-        assert paper_tables.readable(table).set_index("Variant")["Seeds"].to_dict() == {
-            "none": "3", "L2": "3 (1 diverged)", "decay 200K": "3",
+        assert paper_tables.readable(table).set_index("Setting")["Seeds"].to_dict() == {
+            "none, 4,096": "3", "L2, 4,096, α₀ = 1": "3 (1 diverged)", "decay 200K, 4,096, α₀ = 1": "3",
         }  # fmt: skip
+
+
+def test_a_cell_without_shaping_has_no_weight_unless_one_is_its_label():
+    cell = {"variant": "none", "budget": 500_000}
+    assert paper_tables.cell_label({**cell, "alpha0": 1.0}) == "none, 500K"
+    assert paper_tables.cell_label({**cell, "alpha0": 0.5}) == "none, 500K, α₀ = 0.5"
+
+
+def test_robust_measures_are_those_of_the_scores():
+    scores = scores_frame(synthetic.runs(synthetic.PAPER_GRID, 5))
+    frame = paper_tables.readable(paper_tables.robust(scores)).set_index("Setting")
+    row = scores[(scores["variant"] == "l2") & (scores["budget"] == 1_000_000) & (scores["metric"] == "success_rate")]
+    shown = frame.loc["L2, 1M, α₀ = 1"]
+    assert shown["Success, IQM (%) [95 % interval]"].startswith(f"{100 * row['iqm'].iloc[0]:.1f} [")
+    assert shown["Better than none in (%) [95 % interval]"].startswith(f"{100 * row['improvement'].iloc[0]:.0f} [")
+    assert frame.loc["none, 1M", "Better than none in (%) [95 % interval]"] == "\N{EN DASH}"
+    assert len(frame) == 23
 
 
 def test_missing_interval_leaves_the_value_alone(cells, published):
@@ -152,7 +170,7 @@ def test_missing_interval_leaves_the_value_alone(cells, published):
 def test_save_writes_numbers_and_text(tmp_path, cells, published):
     paths = paper_tables.save(paper_tables.table_1(cells, published), "Caption.", tmp_path / "table_1")
     assert [path.name for path in paths] == ["table_1.csv", "table_1.md"]
-    assert paths[1].read_text(encoding="utf-8").startswith("Caption.\n\n| Rank |")
+    assert paths[1].read_text(encoding="utf-8").startswith("Caption.\n\n| Setting | Rank |")
 
 
 def test_the_published_tables_and_the_run_they_leave_out_are_all_runs_of_the_release():

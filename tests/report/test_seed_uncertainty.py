@@ -32,8 +32,8 @@ def variance():
 
 def test_power_rows_stand_by_variant_with_their_numbers(power):
     rows = seed_uncertainty.power_grid(power).rows
-    assert rows[0] == ["L2", "500K", "1", "0.111", "0.020", "5", "0.90", "0.85", "3"]
-    assert rows[1] == ["L2", "500K", "0.5", "\N{MINUS SIGN}0.029", "0.050", "5", "0.10", "0.05", "over 10,000"]
+    assert rows[0] == ["L2, 500K, α₀ = 1", "11.1", "2.0", "5", "0.90", "0.85", "3"]
+    assert rows[1] == ["L2, 500K, α₀ = 0.5", "\N{MINUS SIGN}2.9", "5.0", "5", "0.10", "0.05", "over 10,000"]
     assert rows[2][-1] == "12"
 
 
@@ -60,7 +60,7 @@ def test_limits_are_those_of_the_statistics():
 
 def test_variance_is_shown_as_deviations_and_share(variance):
     rows = seed_uncertainty.variance_grid(variance).rows
-    assert rows[2] == ["decay 300K", "1M", "1", "5", "0.090", "0.010", "99\N{NO-BREAK SPACE}%"]
+    assert rows[2] == ["decay 300K, 1M, α₀ = 1", "5", "9.0", "1.0", "99\N{NO-BREAK SPACE}%"]
     assert rows[0][-1] == "75\N{NO-BREAK SPACE}%"
 
 
@@ -78,10 +78,10 @@ def test_winners_are_listed_and_the_first_is_named():
     winners = pd.DataFrame(
         {"variant": ["l2", "none"], "budget": [1_000_000] * 2, "alpha0": [1.0] * 2, "share": [0.625, 0.375]}
     )
-    assert seed_uncertainty.winners_grid(winners).rows[0] == ["L2", "1M", "1", "62.5\N{NO-BREAK SPACE}%"]
+    assert seed_uncertainty.winners_grid(winners).rows[0] == ["L2, 1M, α₀ = 1", "62.5\N{NO-BREAK SPACE}%"]
     text = seed_uncertainty.winners_sentence(winners)
     assert "2 cells could have come out best" in text
-    assert "L2 (1M, α₀ = 1), in 62.5" in text
+    assert "L2, 1M, α₀ = 1, in 62.5" in text
     assert "lacks" in seed_uncertainty.winners_sentence(winners.iloc[:0])
 
 
@@ -90,7 +90,7 @@ def test_spread_stands_beside_what_the_paper_reports():
     quantities = ["best_success", "ratio", *single_seed_studies.CORRELATIONS]
     grid = seed_uncertainty.spread_grid(pd.DataFrame({"quantity": quantities} | levels), synthetic.published())
     assert grid.headings == ["Quantity", "5 %", "25 %", "50 %", "75 %", "95 %", "published"]
-    assert grid.rows[0] == ["Success rate of the best cell", "0.05", "0.25", "0.50", "0.75", "0.95", "0.26"]
+    assert grid.rows[0] == ["Success of the best cell (%)", "5.00", "25.00", "50.00", "75.00", "95.00", "25.80"]
     assert [row[-1] for row in grid.rows[1:]] == ["2.41", "0.91", "0.37", "0.30"]  # recomputed from Table 2
 
 

@@ -62,13 +62,13 @@ def test_section_sets_every_published_run_beside_ours(released):
     rows = {row[0]: [entry.replace("\N{MINUS SIGN}", "-") for entry in row[1:]] for row in grid.rows}
     assert len(rows) == len(released["cells"]) == 8
     left_out = rows["none_500K_alpha_5"]
-    assert left_out[:3] == ["none", "500K, α₀ = 0.5", "0.296"]
+    assert left_out[:3] == ["none", "500K, α₀ = 0.5", "29.6"]
     assert left_out[4] == "-284.51"
     cells = released["cells"].set_index(["variant", "budget", "alpha0"])
     for place, metric in ((3, "success_rate"), (5, "mean_return")):
         ours = cells.loc[("none", 500_000, 0.5)]
-        digits = 3 if metric == "success_rate" else 2
-        numbers = [ours[f"{metric}{end}"] for end in ("", "_low", "_high")]
+        digits, factor = (1, 100) if metric == "success_rate" else (2, 1)
+        numbers = [factor * ours[f"{metric}{end}"] for end in ("", "_low", "_high")]
         assert left_out[place] == "{} [{}, {}]".format(*(f"{value:.{digits}f}" for value in numbers))
 
 
@@ -84,7 +84,7 @@ def test_section_lists_our_logs_and_then_the_published_one(section):
 def test_section_of_switches_names_the_largest_effect_and_the_interactions(released, effects):
     given = {**released, "effects": effects}
     text = " ".join(study_sections.section("attribution", given, LOGS).sentences)
-    assert "success, any step: a: epochs 10 to 5 (none, as the last one, to the end), 0.200 [0.200, 0.200]" in text
+    assert "success, any step: a: epochs 10 to 5 (none, as the last one, to the end), 20.0 [20.0, 20.0] points" in text
     assert "depends on the others beyond chance for a (success" in text
     weak = effects.assign(p_holm=0.06)
     assert "No switch's effect depends on the others beyond chance." in study_sections.effects_sentence(weak)
@@ -101,7 +101,7 @@ def test_best_cell_is_the_one_with_the_highest_success(released):
     cells.loc[(cells["variant"] == "l2sq"), "success_rate"] = 0.9
     text = study_sections.best_sentence(cells)
     assert text.startswith("The cell with the highest success rate is released late, L2² (500K, α₀ = 0.5): success")
-    assert "any step 0.900" in text
+    assert "any step 90.0" in text
 
 
 def test_one_seed_a_cell_ranges_over_the_studies_of_one_seed(section, released):
@@ -118,8 +118,8 @@ def test_section_says_whether_a_peer_differs(released):
     same = study_sections.agreement_sentence(agreement_frame(ours, peers()))
     assert same.startswith("None of 8 measures differs from Stable-Baselines3's beyond chance (8 seeds beside 5); the")
     frame = agreement_frame(ours, peers())
-    low, high = (f"{frame[name].iloc[0]:.3f}".replace("-", "\N{MINUS SIGN}") for name in ("ci_low", "ci_high"))
-    assert same.endswith(f" [{low}, {high}].")
+    low, high = (f"{100 * frame[name].iloc[0]:.1f}".replace("-", "\N{MINUS SIGN}") for name in ("ci_low", "ci_high"))
+    assert same.endswith(f" [{low}, {high}] points.")
     apart = study_sections.agreement_sentence(agreement_frame(ours, peers(0.5)))
     assert apart.startswith("1 of 8 measures differ")
     assert apart.endswith("success, any step.")
@@ -137,7 +137,7 @@ def test_section_counts_the_differences_that_survive_holm(released):
     alone = study_sections.shaping_sentence(shaped.assign(p=np.nan, p_holm=np.nan))
     assert alone == "With one seed no difference between shaped cells and none can be told from chance."
     text = study_sections.shaping_sentence(shaped)
-    assert "distance at the last step (mm) in 5 of 5 (5 for the better)" in text
+    assert "distance at the last step in 5 of 5 (5 for the better)" in text
     assert "success, any step in 0 of 5," in text
 
 
@@ -151,7 +151,7 @@ def test_section_corrects_over_the_measures_of_the_only_shaped_cell(released):
     shaped.loc[shaped["metric"] == "mean_return", "p"] = 0.015  # 4 times as much: above
     changed, chance = study_sections.shaping_sentence(shaped).split("Not to be told from chance")
     minus = "\N{MINUS SIGN}"
-    assert f"5 %): distance at the last step (mm) {minus}10.0 [{minus}20.0, 10.0], p 0.045." in changed
+    assert f"5 %): distance at the last step {minus}10.0 [{minus}20.0, 10.0] mm, p 0.045." in changed
     assert f"mean return {minus}0.01 [{minus}0.02, 0.01], p 0.060" in chance
     assert "success" not in changed
     section = study_sections.section("tuned", {**released, "comparisons": shaped}, LOGS)
@@ -174,7 +174,7 @@ def test_document_holds_every_table_and_figure(released):
     logged = pd.DataFrame({"iteration": [1, 2], **curve})
     given = {"released": {**released, "controllers": controllers, "logged": logged}}
     text = study_sections.document(given, LOGS)
-    assert text.startswith("## The study as the released code computes it")
+    assert text.startswith("## Released")
     assert text.count("<img ") == 4
     assert text.count("| --: |") >= 4
     assert study_sections.document({}, LOGS) == ""

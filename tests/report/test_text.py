@@ -21,13 +21,13 @@ def test_asking_for_words_that_are_not_there_is_an_error():
 
 
 def test_a_hole_that_nothing_fills_is_an_error():
-    with pytest.raises(KeyError, match=r"nothing fills \{budget\} of summary\.apart"):
-        text.say("summary.apart")
+    with pytest.raises(KeyError, match=r"nothing fills \{count\} of first\.times"):
+        text.say("first.times")
 
 
 def test_every_view_of_a_study_has_a_title_and_a_caption():
     assert set(text.entry("views")) == set(VIEWS)
-    assert all(words.keys() == {"title", "caption"} for words in text.entry("views").values())
+    assert all(words.keys() >= {"title", "caption"} for words in text.entry("views").values())
 
 
 def test_every_title_has_a_caption():
@@ -66,5 +66,6 @@ def test_words_stand_in_no_module_of_the_report():
             and " " in node.value.strip()
             and "<" not in node.value
             and "svg" not in node.value
+            and '="' not in node.value
         ]
         assert not found, path.name

@@ -3,7 +3,7 @@ KINDS = ["svg", "pdf", "png"]
 # A figure is a function of `figures/paper.py` or `figures/robustness.py`, its name here, and its title and caption in
 # the report's text file.
 FIGURE_NAMES = ["figure_1", "figure_2", "figure_3", "figure_4"]
-FIGURE_NAMES += ["seed_strip", "forest", "improvement", "success_by_radius", "long_episodes", "lottery"]
+FIGURE_NAMES += ["seed_strip", "profiles", "forest", "improvement", "success_by_radius", "long_episodes", "lottery"]
 FIGURE_NAMES += ["peers"] if PEERS else []
 FIGURES = expand("figures/{name}.{kind}", name=FIGURE_NAMES, kind=KINDS)
 FORMATTED_TABLES = expand(

@@ -1,6 +1,7 @@
 # From the study's tables to executed notebooks; the sources are Python files with cell marks.
 NOTEBOOK_SOURCES = {path.stem: source(path) for path in sorted((HERE / "workflow/notebooks").glob("*.py"))}
 NOTEBOOKS = expand("results/notebooks/{notebook}.ipynb", notebook=NOTEBOOK_SOURCES)
+NOTEBOOK_PAGES = expand("report/notebooks/{notebook}.html", notebook=NOTEBOOK_SOURCES)
 
 
 rule run_notebook:
@@ -33,3 +34,26 @@ rule run_notebook:
         notebook_code=lambda wildcards: code_hash(NOTEBOOK_SOURCES[wildcards.notebook]),
     script:
         "../scripts/run_notebook.py"
+
+
+rule show_notebook:
+    input:
+        "results/notebooks/{notebook}.ipynb",
+    output:
+        "report/notebooks/{notebook}.html",
+    log:
+        "results/logs/notebooks/{notebook}_page.log",
+    benchmark:
+        "results/benchmarks/notebooks/{notebook}_page.tsv"
+    wildcard_constraints:
+        notebook=one_of(NOTEBOOK_SOURCES),
+    group:
+        "notebooks"
+    threads: 1
+    resources:
+        mem_mb=growing(1500),
+        runtime=growing(10),
+    params:
+        code=code("show_notebook"),
+    script:
+        "../scripts/show_notebook.py"

@@ -20,6 +20,8 @@ rule build_crate:
             MADE_FIGURES,
             "results/check.txt",
             "report/report.html",
+            "report/report.pdf",
+            NOTEBOOK_PAGES,
         ],
         manifests=expand("{block}/manifest.json", block=BLOCKS),
     output:

@@ -1,4 +1,4 @@
-# From everything to one HTML file.
+# From everything to one HTML file and one PDF, and the notebooks as pages beside them.
 # Every file of the blocks but the Monitor folders and the records of training: a folder has no checksum, and a record
 # tells times, so one made again with the same results would count as changed. The job that makes them makes the policy.
 rule build_report:
@@ -15,13 +15,16 @@ rule build_report:
         ledger=source("report/claims.yaml"),
         figures=FIGURES + MADE_FIGURES,
         media=MEDIA,
-        notebooks=NOTEBOOKS,
+        notebooks=NOTEBOOK_PAGES,
         manifests=expand("{block}/manifest.json", block=BLOCKS),
         further_manifests=MADE_MANIFESTS,
         template=source("src/reacher_shaping/report/report.html.j2"),
+        paper=source("src/reacher_shaping/report/report.typ"),
+        sortable=source("src/reacher_shaping/report/vendor/sortable.js"),
         words=WORDS,
     output:
-        "report/report.html",
+        page="report/report.html",
+        paper="report/report.pdf",
     log:
         "results/logs/build_report.log",
     benchmark:
@@ -58,13 +61,16 @@ use rule build_report as build_reference_report with:
         ledger=source("report/claims.yaml"),
         figures=FIGURES + MADE_FIGURES,
         media=[],
-        notebooks=NOTEBOOKS,
+        notebooks=NOTEBOOK_PAGES,
         manifests=source("report/reference/manifest.json"),
         further_manifests=[],
         template=source("src/reacher_shaping/report/report.html.j2"),
+        paper=source("src/reacher_shaping/report/report.typ"),
+        sortable=source("src/reacher_shaping/report/vendor/sortable.js"),
         words=WORDS,
     output:
-        "report/reference.html",
+        page="report/reference.html",
+        paper="report/reference.pdf",
     log:
         "results/logs/build_reference_report.log",
     benchmark:

@@ -1,4 +1,4 @@
-"""Build the report, one HTML file, from everything the study made."""
+"""Build the report, one HTML file and one PDF, from everything the study made."""
 
 import json
 from pathlib import Path
@@ -6,9 +6,9 @@ from pathlib import Path
 from job import logged
 
 from reacher_shaping.analysis import sanity
-from reacher_shaping.report import html
+from reacher_shaping.report import html, pdf
 from reacher_shaping.report.loader import load
-from reacher_shaping.storage.files import ArtifactError, read_json, write_text
+from reacher_shaping.storage.files import ArtifactError, read_json, write_bytes, write_text
 from reacher_shaping.storage.provenance import differing, require_asked
 
 given, params = snakemake.input, snakemake.params
@@ -23,11 +23,8 @@ with logged(snakemake):
     elif changed := differing(Path("results"), records[0].get("tables", {})):
         raise ValueError(changed[0])
     # The reference run brings its own settings: config.yaml may ask for another study by now.
-    told = (
-        records[0]
-        if "study" in records[0]
-        else {"study": json.loads(params.study), "settings_hash": params.settings_hash}
-    )
+    now = json.loads(params.study)
+    told = records[0] if "study" in records[0] else {"study": now, "settings_hash": params.settings_hash}
     study = load("results", Path(given.table2).parent)
     if "study" not in records[0]:
         expected = {"seeds": params.seeds, "episodes": params.episodes}
@@ -41,7 +38,9 @@ with logged(snakemake):
         figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},
         media=[Path(path) for path in given.media],
         notebooks=[Path(path) for path in given.notebooks],
+        headings=now["experiments"],
         manifests=[block for record in records for block in record.get("blocks", [record])],
         template=Path(given.template),
     )
-    write_text(snakemake.output[0], html.build(inputs))
+    write_text(snakemake.output.page, html.build(inputs))
+    write_bytes(snakemake.output.paper, pdf.build(inputs))

@@ -9,7 +9,7 @@ from job import logged
 from reacher_shaping.jobs import notebooks
 
 given, log = snakemake.input, Path(snakemake.log[0])
-folders = {"results": Path(given.claims).parent, "published": Path(given.table2).parent}
+folders = {"results": Path(given.claims).parent, "report": Path(given.ledger).parent}
 
 with logged(snakemake), tempfile.TemporaryDirectory() as folder:
     # A folder of the declared inputs alone, under the same names wherever they lie.
@@ -18,8 +18,7 @@ with logged(snakemake), tempfile.TemporaryDirectory() as folder:
             link = Path(folder, name, path.relative_to(folders[name]))
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(path.resolve())
-    Path(folder, "claims.yaml").symlink_to(Path(given.ledger).resolve())  # beside the published values, as in report/
-    parameters = {name: name for name in folders}
+    parameters = {"results": "results", "published": "report/published"}
     notebooks.execute(
         Path(given.source), Path(snakemake.output[0]), parameters, log.with_suffix(".ipynb"), Path(folder)
     )

@@ -1,7 +1,7 @@
 """Figures by their names: a figure is a function of the tables that its parameters name."""
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -13,18 +13,24 @@ MAIN = (paper, robustness)
 STUDY = (studies,)
 
 
+def function_of(name: str, modules: tuple[ModuleType, ...] = MAIN) -> Callable[..., Figure]:
+    """The function that draws the figure of that name. Raises KeyError where no module has it."""
+    for module in modules:
+        if hasattr(module, name):
+            function: Callable[..., Figure] = getattr(module, name)
+            return function
+    raise KeyError(f"no figure is called {name}")
+
+
 def draw(name: str, tables: Mapping[str, Any], modules: tuple[ModuleType, ...] = MAIN) -> Figure:
     """The figure of that name: the function of that name, called with the tables that its parameters name.
 
     A parameter that is not among the tables keeps its default. Raises KeyError where no module has the function or a
     table without a default is missing.
     """
-    function = next((getattr(module, name) for module in modules if hasattr(module, name)), None)
-    if function is None:
-        raise KeyError(f"no figure is called {name}")
+    function = function_of(name, modules)
     parameters = inspect.signature(function).parameters.values()
     missing = [one.name for one in parameters if one.default is one.empty and one.name not in tables]
     if missing:
         raise KeyError(f"the figure {name} is drawn from {', '.join(missing)}, which is not there")
-    figure: Figure = function(**{one.name: tables[one.name] for one in parameters if one.name in tables})
-    return figure
+    return function(**{one.name: tables[one.name] for one in parameters if one.name in tables})

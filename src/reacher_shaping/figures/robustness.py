@@ -19,6 +19,7 @@ from reacher_shaping.figures.style import (
     percent,
     variant_color,
     variant_legend,
+    variant_look,
 )
 from reacher_shaping.labels import CELL, budget_label, cell_order, of_protocol, setting_label, variant_label
 
@@ -255,4 +256,37 @@ def lottery(lottery: pd.DataFrame) -> Figure:
     axes.tick_params(axis="y", length=0)
     axes.set(xlim=(0, 1.08), xlabel="Share of single-seed studies in which it comes out", ylabel="")
     percent(axes.xaxis)
+    return figure
+
+
+GROUP_NAMES = {"none": "none", "constant": "constant", "decay": "decay", "decay_l2sq": "decay, L2²"}
+GROUP_LOOKS = {"none": "none", "constant": "l2", "decay": "decay300k", "decay_l2sq": "decay300k_l2sq"}
+"""The variant whose look stands for a group."""
+
+
+@look()
+def profiles(profiles: pd.DataFrame, protocol: str | None = None) -> Figure:
+    """A panel per budget, a line per group of variants: the share of runs whose success is above a threshold."""
+    ours = of_protocol(profiles, protocol)
+    if ours.empty:
+        return empty_figure()
+    budgets = sorted(ours["budget"].unique())
+    figure = Figure(figsize=(3.6 * len(budgets) + 0.6, 3.2))
+    panels = np.atleast_1d(figure.subplots(1, len(budgets), sharey=True))
+    for axes, budget in zip(panels, budgets, strict=True):
+        for group, variant in GROUP_LOOKS.items():
+            own = ours[(ours["budget"] == budget) & (ours["group"] == group)].sort_values("threshold")
+            if own.empty:
+                continue
+            drawn = variant_look(variant)
+            line = {"color": drawn.color, "dashes": drawn.dashes, "label": GROUP_NAMES[group]}
+            axes.plot(own["threshold"], own["share"], drawstyle="steps-post", **line)
+            edges = {"step": "post", "color": drawn.color, "alpha": 0.14, "linewidth": 0}
+            axes.fill_between(own["threshold"], own["share_low"], own["share_high"], **edges)
+        axes.set_title(budget_label(int(budget)))
+        axes.set_xlabel("Success rate")
+        percent(axes.xaxis)
+        percent(axes.yaxis)
+    panels[0].set_ylabel("Share of runs above it")
+    panels[-1].legend(loc="upper right")
     return figure

@@ -19,6 +19,7 @@ from typing import Any
 import jupytext
 import nbformat
 import papermill
+from nbconvert import HTMLExporter
 
 from reacher_shaping.storage.files import write_bytes, write_text
 
@@ -76,6 +77,13 @@ def execute(
                 write_bytes(log, executed.read_bytes())
         notebook = clean(nbformat.read(executed, as_version=4))  # type: ignore[no-untyped-call]
     write_text(out, nbformat.writes(notebook) + "\n")  # type: ignore[no-untyped-call]
+
+
+def page(notebook: Path) -> str:
+    """An executed notebook as one HTML file that needs no network."""
+    exporter = HTMLExporter(mathjax_url="", require_js_url="", embed_images=True)  # type: ignore[no-untyped-call]
+    content: str = exporter.from_filename(str(notebook))[0]
+    return content
 
 
 def main(arguments: list[str]) -> None:

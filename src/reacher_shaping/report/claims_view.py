@@ -131,6 +131,8 @@ def worth(row: Row) -> list[str]:
         texts.append(say("claim.family", verdict=row["family_verdict"]))
     if pd.notna(row.get("power", np.nan)):
         texts.append(say("claim.power", power=f"{row['power']:.2f}", refuted=f"{row['refuted_if_true']:.2f}"))
+    if pd.notna(row.get("second_verdict", np.nan)) and row["second_verdict"]:
+        texts.append(say("claim.second", verdict=row["second_verdict"]))
     if row.get("published_holds") == 0:
         texts.append(say("claim.published_against"))
     return texts

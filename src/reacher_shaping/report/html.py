@@ -5,7 +5,7 @@ import csv
 import io
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from reacher_shaping.report import (
 )
 from reacher_shaping.report.loader import Study
 from reacher_shaping.report.markup import to_html
+from reacher_shaping.report.sources import sources
 from reacher_shaping.report.summary import VERDICTS, summary
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import (
@@ -50,7 +51,8 @@ class Inputs:
     """What a report is made of; what is not there is left out, and the report says so.
 
     `settings` holds the resolved settings; `study` the tables; `figures` maps names such as `figure_1` to SVG files, in
-    the order to show; `manifests` are those of the study's blocks.
+    the order to show; `manifests` are those of the study's blocks; `headings` has the `title` and `question` of each
+    further study.
     """
 
     settings: Mapping[str, Any]
@@ -58,6 +60,7 @@ class Inputs:
     figures: Mapping[str, Path]
     media: Sequence[Path] = ()
     manifests: Sequence[Mapping[str, Any]] = ()
+    headings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     notebooks: Sequence[Path] = ()
     settings_hash: str = ""
     protocol: str | None = None
@@ -117,7 +120,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
                 study.training_logs,
                 study.tables.get("correlation"),
                 study.every_published,
-                headed(inputs.settings, name),
+                headed(inputs, name),
             )
             for name, tables in study.experiments.items()
         ],
@@ -135,9 +138,9 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     }
 
 
-def headed(settings: Mapping[str, Any], study: str) -> dict[str, str]:
-    """Title and question of a further study, as far as its settings have them."""
-    own = settings.get("experiments", {}).get(study, {})
+def headed(inputs: Inputs, study: str) -> dict[str, str]:
+    """Title and question of a further study, as far as they are known."""
+    own = inputs.headings.get(study, {})
     return {name: own[name] for name in ("title", "question") if own.get(name)}
 
 
@@ -174,8 +177,9 @@ def _tables(cells: pd.DataFrame, inputs: Inputs) -> dict[str, dict[str, Any]]:
         "table_3": of_table(paper_tables.table_3(cells, published)),
         "behaviour": of_table(paper_tables.behaviour(cells)),
         "learning": of_table(paper_tables.learning(cells, runs)),
-        "robust": of_table(paper_tables.robust(cells, tables.get("comparisons"))),
     }
+    if "scores" in tables:
+        grids["robust"] = of_table(paper_tables.robust(tables["scores"], protocol))
     if "power" in tables:
         grids["power"] = seed_uncertainty.power_grid(tables["power"], protocol)
     if "variance" in tables:
@@ -215,7 +219,8 @@ def _figure(name: str, path: Path, inputs: Inputs) -> pictures.Picture:
     else:
         caption = captions.caption(name, study.tables["cells"], study.tables["runs"], inputs.protocol)
     alternative = f"{title}. {caption.split('. ')[0].rstrip('.')}."
-    return pictures.Picture(name, title, caption, alternative, pictures.data_uri(path))
+    study_name = experiment if experiment in study.experiments else ""
+    return pictures.Picture(name, title, caption, alternative, pictures.data_uri(path), sources(name, study_name))
 
 
 def budgets_sentence(peers: pd.DataFrame) -> str:

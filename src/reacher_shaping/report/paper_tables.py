@@ -112,18 +112,16 @@ def learning(cells: pd.DataFrame, runs: pd.DataFrame, protocol: str | None = Non
     return table
 
 
-def robust(cells: pd.DataFrame, comparisons: pd.DataFrame | None, protocol: str | None = None) -> pd.DataFrame:
-    """Measures that single runs cannot move: as `behaviour`, with the interquartile means of success and return, and
-    where there are comparisons the probability of improvement in success over none of the same budget.
+def robust(scores: pd.DataFrame, protocol: str | None = None) -> pd.DataFrame:
+    """Success in measures that single runs cannot move, by variant, from the table of scores.
+
+    Columns: the cell, seeds, `success_rate, iqm, improvement` with `_low` and `_high`.
     """
-    ours = of_protocol(cells, protocol)
-    table = _measured(ours, ("success_rate",)).merge(ours[[*CELL, "success_rate_iqm", "mean_return_iqm"]], on=CELL)
-    if comparisons is None:
-        return table
-    rows = of_protocol(comparisons, protocol)
-    rows = rows[(rows["family"] == "none") & (rows["metric"] == "success_rate")]
-    chances = [name for name in rows if str(name).startswith("improvement")]
-    return table.merge(rows[[*CELL, *chances]], on=CELL, how="left")
+    rows = of_protocol(scores, protocol)
+    rows = rows[rows["metric"] == "success_rate"].rename(columns=lambda name: str(name).replace("mean", "success_rate"))
+    keys = [cell_order(row) for row in rows.to_dict("records")]
+    names = [f"{name}{end}" for name in ("success_rate", "iqm", "improvement") for end in ("", "_low", "_high")]
+    return rows[[*CELL, "seeds", *names]].iloc[sorted(range(len(keys)), key=keys.__getitem__)].reset_index(drop=True)
 
 
 def _measured(cells: pd.DataFrame, measures: tuple[str, ...]) -> pd.DataFrame:
@@ -180,7 +178,7 @@ def _entry(name: str, row: dict[Any, Any]) -> str:
 
 def decimals(name: str) -> tuple[int, float]:
     """Decimals of a measure and the factor it is shown with: shares in per cent, distances in mm."""
-    if "success_rate" in name or name == "share_within_radius":
+    if "success_rate" in name or name in ("share_within_radius", "iqm"):
         return 1, 100.0
     return FORMATS.get(name, (2 if "return" in name else 3, 1.0))
 

@@ -156,7 +156,7 @@ def _study(inputs: Inputs, name: str, own: Any) -> list[Part]:
     """A further study: its title, its question and what it found."""
     study = inputs.study
     section = study_sections.section(
-        name, own, study.training_logs, study.tables.get("correlation"), None, headed(inputs.settings, name)
+        name, own, study.training_logs, study.tables.get("correlation"), None, headed(inputs, name)
     )
     texts = [section.intro, *section.sentences]
     return [{"kind": "heading", "text": section.title}, _text(" ".join(text for text in texts if text))]

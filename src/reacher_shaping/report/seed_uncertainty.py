@@ -116,7 +116,8 @@ def spread_grid(spread: pd.DataFrame, published: pd.DataFrame) -> Grid:
     rows = []
     for row in spread.to_dict("records"):
         name = row["quantity"]
-        values = [row[level] for level in levels] + [theirs.get(name, np.nan)]
+        factor = 100 if name == "best_success" else 1
+        values = [factor * value for value in (*(row[level] for level in levels), theirs.get(name, np.nan))]
         rows.append([entry("quantities").get(name, name), *(_text(value, 2) for value in values)])
     headings = [f"{level.removeprefix('q').lstrip('0')} %" for level in levels]
     first, last = entry("tables.spread")

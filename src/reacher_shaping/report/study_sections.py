@@ -6,6 +6,7 @@ Every number comes from the experiment's tables; here they are only chosen, roun
 import base64
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
@@ -22,6 +23,7 @@ from reacher_shaping.report.text_tables import Grid
 from reacher_shaping.settings import outputs
 
 LEVEL = 0.05
+DIFFERENCE = ("difference", "ci_low", "ci_high")
 COLLAPSE = 1000  # a difference in return that no policy near its target can make
 
 
@@ -120,9 +122,17 @@ def caption(view: str, tables: Mapping[str, pd.DataFrame], training_logs: pd.Dat
 
 
 def within(metric: str) -> str:
-    """A measure's name as it stands within a sentence."""
-    heading = say(f"measures.{metric}")
+    """A measure's name as it stands within a sentence, without its unit."""
+    heading = say(f"measures.{metric}").partition(" (")[0]
     return heading[0].lower() + heading[1:]
+
+
+def with_unit(row: Mapping[Any, Any], metric: str, name: str, low: str, high: str) -> str:
+    """A value or difference of a measure with its limits and the unit that the measure's heading gives."""
+    unit = say(f"measures.{metric}").partition(" (")[2].removesuffix(")")
+    if name != metric and unit == "%":
+        unit = say("study_sentences.points")
+    return f"{interval(row, name, low, high, *decimals(metric))}{unit and ' '}{unit}"
 
 
 def hypotheses_sentence(table: pd.DataFrame) -> str:
@@ -137,7 +147,7 @@ def best_sentence(cells: pd.DataFrame) -> str:
     row = cells.sort_values("success_rate", ascending=False).iloc[0].to_dict()
     name = f"{protocol_label(row['protocol'])}, {variant_label(row['variant'])}"
     texts = [
-        f"{within(metric)} {interval(row, metric, f'{metric}_low', f'{metric}_high', *decimals(metric))}"
+        f"{within(metric)} {with_unit(row, metric, metric, f'{metric}_low', f'{metric}_high')}"
         for metric in ("success_rate", "final_success_rate", "mean_return")
     ]
     setting = setting_label(int(row["budget"]), row["alpha0"])
@@ -148,7 +158,6 @@ def effects_sentence(effects: pd.DataFrame) -> str:
     """Which switch moves each measure most, which let returns collapse, and where switches interact beyond chance."""
     parts, collapsed = [], []
     for metric in METRICS:
-        digits, factor = decimals(metric)
         single = effects[(effects["metric"] == metric) & effects["effect"].isin(["alone", "last"])]
         single = single.dropna(subset="difference")
         beyond = (single["difference"].abs() >= COLLAPSE) & (metric == "unit_return")
@@ -157,7 +166,7 @@ def effects_sentence(effects: pd.DataFrame) -> str:
         if single.empty:
             continue
         row = single.iloc[int(single["difference"].abs().to_numpy().argmax())].to_dict()
-        difference = interval(row, "difference", "ci_low", "ci_high", digits, factor)
+        difference = with_unit(row, metric, *DIFFERENCE)
         parts.append(
             say(
                 "study_sentences.effect",
@@ -203,7 +212,7 @@ def agreement_sentence(agreement: pd.DataFrame) -> str:
     apart = tested[tested["p_holm"] < LEVEL]
     if apart.empty:
         first = tested.iloc[0].to_dict()
-        difference = interval(first, "difference", "ci_low", "ci_high", *decimals(first["metric"]))
+        difference = with_unit(first, first["metric"], *DIFFERENCE)
         measure, algorithm = within(first["metric"]), first["algorithm"].upper()
         return say(
             "study_sentences.agreement_none",
@@ -241,7 +250,7 @@ def _only_cell_sentence(measured: pd.DataFrame) -> str:
     changed: list[str] = []
     chance: list[str] = []
     for row in rows.reset_index().to_dict("records"):
-        difference = interval(row, "difference", "ci_low", "ci_high", *decimals(row["metric"]))
+        difference = with_unit(row, row["metric"], *DIFFERENCE)
         measure, p = within(row["metric"]), p_value(row["p_holm"])
         text = say("study_sentences.only_measure", measure=measure, difference=difference, p=p)
         (changed if row["p_holm"] < LEVEL else chance).append(text)

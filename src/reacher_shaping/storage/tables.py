@@ -160,9 +160,13 @@ STUDY_TABLES = {
     "spread": Entry(
         "spread.csv", schemas.SPREAD, "a quantity that a study of one seed a cell reports", "compare_runs", REPORT
     ),
-    "scores": Entry("scores.parquet", schemas.SCORES, "a cell and a measure: robust averages", "compare_runs"),
+    "scores": Entry("scores.parquet", schemas.SCORES, "a cell and a measure: robust averages", "compare_runs", REPORT),
     "profiles": Entry(
-        "profiles.parquet", schemas.PROFILES, "a group of variants, a budget and a success rate", "compare_runs"
+        "profiles.parquet",
+        schemas.PROFILES,
+        "a group of variants, a budget and a success rate",
+        "compare_runs",
+        ("plot_figures",),
     ),
     "peers": Entry("peers.parquet", schemas.PEERS, "a run of another algorithm", "gather_peers", always=False),
     "trials": Entry("search/trials.csv", schemas.TRIALS, "a trial of the search", "search", always=False),
