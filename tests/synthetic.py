@@ -151,7 +151,7 @@ def claims():
     )
     frame.loc[frame["verdict"] == "inconclusive", "seeds_to_decide"] = 45.0
     frame = frame.assign(family_verdict=frame["verdict"], power=0.85, refuted_if_true=0.01, published_holds=1.0)
-    return frame.assign(first_dated="2026-11-22", first_verdict=frame["verdict"])
+    return frame.assign(first_dated="2026-11-22", first_verdict=frame["verdict"], second_verdict=frame["verdict"])
 
 
 def ledger():

@@ -97,7 +97,7 @@ def _snakemake(folder, *arguments):
 
 def _planned(folder):
     """Inputs and outputs of each job of a dry run."""
-    rules = ["plot_figures", "format_tables", "run_notebook", "build_reference_report"]
+    rules = ["plot_figures", "format_tables", "run_notebook", "show_notebook", "build_reference_report"]
     said = _snakemake(folder, "--dry-run", "--quiet", "host", "--allowed-rules", *rules)
     jobs = re.findall(r"^ *(?:local)?rule (\w+):\n +input: (.*)\n +output: (.*)$", said, re.MULTILINE)
     return {rule: (inputs.split(", "), outputs.split(", ")) for rule, inputs, outputs in jobs}

@@ -24,7 +24,9 @@ with logged(snakemake):
     write_table(output.radii, radius_cells(radii), schemas.RADII)
     long = pd.concat(
         [
-            read_table(unchanged(path, manifest, block), block_schemas.LONG_EPISODES).assign(**{name: cell[name] for name in KEY})
+            read_table(unchanged(path, manifest, block), block_schemas.LONG_EPISODES).assign(
+                **{name: cell[name] for name in KEY}
+            )
             for cell, block, path, manifest in zip(
                 params.cells, asked, given.long_episodes, given.long_manifests, strict=True
             )

@@ -39,8 +39,8 @@ def _code(blocks: Sequence[Mapping[str, Any]]) -> str:
     """
     commits = {str(block["git"]["commit"])[:12] for block in blocks}
     untold = sum(block["git"]["dirty"] is not False for block in blocks)
-    changed = f", {untold} of {len(blocks)} blocks with uncommitted changes" if untold else ""
-    return f"{f'of {len(commits)} commits' if len(commits) > 1 else commits.pop()}{changed}"
+    code = say("readme.commits", count=len(commits)) if len(commits) > 1 else commits.pop()
+    return code + (say("readme.untold", count=untold, blocks=len(blocks)) if untold else "")
 
 
 def put_headline(readme: str, text: str) -> str:
