@@ -114,6 +114,9 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     shutil.copytree(KEPT, tmp_path / "results", ignore=shutil.ignore_patterns("experiments"))
     table = tmp_path / "results" / "peers.parquet"
     table.unlink(missing_ok=True)
+    if not (radii := tmp_path / "results" / "run_radii.parquet").exists():
+        runs = read_table(tmp_path / "results" / "runs.parquet", schemas.RUNS)
+        write_table(radii, runs.assign(mode="stochastic", radius=EVALUATION.radius), schemas.RUN_RADII)
     for there in (False, True):
         if there:
             write_table(table, synthetic.peers(), schemas.PEERS)
