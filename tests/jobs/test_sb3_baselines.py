@@ -116,7 +116,8 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     table.unlink(missing_ok=True)
     if not (radii := tmp_path / "results" / "run_radii.parquet").exists():
         runs = read_table(tmp_path / "results" / "runs.parquet", schemas.RUNS)
-        write_table(radii, runs.assign(mode="stochastic", radius=EVALUATION.radius), schemas.RUN_RADII)
+        own = [*schemas.RUN_RADII.columns, "success_rate", "final_success_rate"]
+        write_table(radii, runs.assign(mode="stochastic", radius=EVALUATION.radius)[own], schemas.RUN_RADII)
     for there in (False, True):
         if there:
             write_table(table, synthetic.peers(), schemas.PEERS)
@@ -126,7 +127,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
         report = jobs["build_reference_report"][0]
         assert ("results/peers.parquet" in report, "figures/peers.svg" in report) == (there, there)
         assert "train_peer" not in jobs
-    made = [name for name in report if name.startswith(("figures/figure_", "results/tables/", "results/notebooks/"))]
+    made = [name for name in report if name.startswith(("figures/figure_", "results/tables/", "report/notebooks/"))]
     _touch(tmp_path, made)  # only what shows the peers is made
     other = tmp_path / "seeds.yaml"
     other.write_text("seeds: 77\n")
