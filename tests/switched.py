@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import synthetic
 
+from reacher_shaping.analysis import comparisons, switch_effects
 from reacher_shaping.analysis.baselines import AGREEMENT_METRICS
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.parts import Switches
@@ -23,6 +24,12 @@ PROTOCOLS |= {
     name: PROTOCOLS["paper"].model_copy(update={"name": name})
     for name in ("paper_with_a", "paper_with_b", "late_without_a", "late_without_b")
 }
+
+LOGS = pd.DataFrame(
+    [{"run": "none_seed0", "protocol": "released", "variant": "none", "budget": 500_000, "peak_return": -38.6,
+      "peak_iteration": 33, "final_return": -87.2, "std_1": 0.4, "std_2": 0.54}]
+)  # fmt: skip
+"""One row of the published training logs."""
 
 NOISE = np.array([-0.02, 0.01, 0.0, 0.03, -0.01, 0.02])
 
@@ -58,3 +65,23 @@ def peers(shift=0.0, seeds=5):
     table = synthetic.runs([("standard", "none", 500_000, 1.0)], seeds)
     table["success_rate"] += shift
     return table.assign(algorithm="ppo")[["algorithm", "seed", "budget", *AGREEMENT_METRICS]]
+
+
+def effects() -> pd.DataFrame:
+    """The effects of the switches over runs whose means are `MEANS`."""
+    return switch_effects.effects_frame(runs(MEANS), SWITCHES, PROTOCOLS)
+
+
+def released() -> dict[str, pd.DataFrame]:
+    """The tables of a study as the released code computes it."""
+    labelled = labelled_runs().replace({"protocol": {"late": "released_late"}})
+    keys = labelled[["protocol", "variant", "budget", "alpha0", "seed"]]
+    numbers = {"peak_return": -40.0 - labelled["seed"], "peak_iteration": 30.0 + labelled["seed"]}
+    logs = keys.assign(**numbers, final_return=-90.0, action_std=0.45)
+    return {
+        "runs": labelled,
+        "cells": synthetic.summary(labelled),
+        "logs": logs,
+        "comparisons": comparisons.comparison_frame(labelled, (*comparisons.METRICS, *comparisons.SPEED)),
+        "correlation": switch_effects.correlation_frame(labelled, synthetic.published(), "released"),
+    }

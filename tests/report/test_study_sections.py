@@ -3,38 +3,22 @@
 import numpy as np
 import pandas as pd
 import pytest
+import switched
 import synthetic
-from switched import MEANS, PROTOCOLS, SWITCHES, labelled_runs, peers
-from switched import runs as switched_runs
+from switched import LOGS, peers
 
-from reacher_shaping.analysis import comparisons, switch_effects
 from reacher_shaping.analysis.baselines import agreement_frame
 from reacher_shaping.report import paper_tables, study_sections, study_tables
-
-LOGS = pd.DataFrame(
-    [{"run": "none_seed0", "protocol": "released", "variant": "none", "budget": 500_000, "peak_return": -38.6,
-      "peak_iteration": 33, "final_return": -87.2, "std_1": 0.4, "std_2": 0.54}]
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def effects():
-    return switch_effects.effects_frame(switched_runs(MEANS), SWITCHES, PROTOCOLS)
+    return switched.effects()
 
 
 @pytest.fixture(scope="module")
 def released():
-    runs = labelled_runs().replace({"protocol": {"late": "released_late"}})
-    keys = runs[["protocol", "variant", "budget", "alpha0", "seed"]]
-    numbers = {"peak_return": -40.0 - runs["seed"], "peak_iteration": 30.0 + runs["seed"]}
-    logs = keys.assign(**numbers, final_return=-90.0, action_std=0.45)
-    return {
-        "runs": runs,
-        "cells": synthetic.summary(runs),
-        "logs": logs,
-        "comparisons": comparisons.comparison_frame(runs, (*comparisons.METRICS, *comparisons.SPEED)),
-        "correlation": switch_effects.correlation_frame(runs, synthetic.published(), "released"),
-    }
+    return switched.released()
 
 
 @pytest.fixture(scope="module")
