@@ -251,6 +251,13 @@ def test_impossible_value_is_refused_in_one_line(path, value, words):
         assert word in message
 
 
+@pytest.mark.parametrize("path", ["KEY", "variants.KEY", "experiments.KEY", "grid.0.KEY", "protocols.paper.ppo.KEY"])
+def test_a_key_that_steers_a_terminal_is_spelt_out(path):
+    message = refusal(changed(path.replace("KEY", "\x1b[31m\x9b1m\u202ered"), 1))
+    assert message.isprintable()
+    assert r"\x1b[31m\x9b1m\u202ered" in message
+
+
 def test_a_renamed_variant_of_the_paper_is_refused_and_not_left_untested():
     config = copy.deepcopy(DEFAULT)
     config["variants"]["slow"] = config["variants"].pop("decay300k")

@@ -63,6 +63,16 @@ def test_what_is_no_settings_file_is_refused_in_one_line_at_once(tmp_path, text,
         assert word in message
 
 
+@pytest.mark.parametrize("text", ["", "a: [", "- a", '"\\e[1m": 1\n"\\e[1m": 2', "a: !%1b[1m x", "a: \x1b[1m"])
+def test_names_and_contents_that_steer_a_terminal_are_spelt_out(tmp_path, text):
+    path = tmp_path / "\x1b[31m.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        read_mapping(path)
+    assert str(refused.value).isprintable()
+    assert r"\x1b[31m.yaml" in str(refused.value)
+
+
 def test_an_alias_is_what_it_stands_for(tmp_path):
     assert read_mapping(written(tmp_path, "a: &few [1, 2]\nb: *few")) == {"a": [1, 2], "b": [1, 2]}
 

@@ -85,3 +85,11 @@ def test_other_metadata_is_refused(tmp_path, content):
     write_json(tmp_path / "crate.json", content)
     with pytest.raises(ArtifactError, match=r"crate\.json: is no crate of this project"):
         crate.checksums(tmp_path / "crate.json")
+
+
+@pytest.mark.parametrize("name", ["../secret", "results/../../secret", "/etc/passwd"])
+def test_crate_that_lists_a_file_out_of_its_folder_is_refused(tmp_path, name):
+    graph = [{"@type": "File", "@id": name, "sha256": "0" * 64}]
+    write_json(tmp_path / "crate.json", {"@graph": graph})
+    with pytest.raises(ArtifactError, match=r"crate\.json: lists .*, which is no file of the study"):
+        crate.checksums(tmp_path / "crate.json")

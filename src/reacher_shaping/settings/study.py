@@ -30,7 +30,7 @@ from reacher_shaping.settings.grid import Known, Placed, placed
 from reacher_shaping.settings.inheritance import resolved
 from reacher_shaping.settings.parts import Evaluation, Experiment, Peers, Rows
 from reacher_shaping.settings.search import Search
-from reacher_shaping.settings.yaml_file import merged, read_mapping
+from reacher_shaping.settings.yaml_file import merged, read_mapping, spelt_out
 
 PEER_PPO: dict[str, Any] = {
     "learning_rate_schedule": "constant",
@@ -242,7 +242,7 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
     try:
         return Study.model_validate(dict(content))
     except ValidationError as error:
-        raise ConfigError(f"{name}: {flat(first_problem(error))}") from None
+        raise ConfigError(spelt_out(f"{name}: {flat(first_problem(error))}")) from None
 
 
 def read_settings(*paths: Path | str) -> dict[str, Any]:

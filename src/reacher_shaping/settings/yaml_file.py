@@ -23,13 +23,18 @@ def read_mapping(path: Path | str, keys: Sequence[str] = ()) -> dict[str, Any]:
 
     Raises ConfigError, one line with the file, the line and what is wrong there.
     """
-    content = _read(path, _CoreSchema)
+    content, name = _read(path, _CoreSchema), spelt_out(str(path))
     allowed = f"a mapping with the keys {', '.join(keys)}" if keys else "a mapping"
     if not content:
-        raise ConfigError(f"{path}: is empty; allowed: {allowed}")
+        raise ConfigError(f"{name}: is empty; allowed: {allowed}")
     if not isinstance(content, dict):
-        raise ConfigError(f"{path}: {short(content)} is not a mapping; allowed: {allowed}")
+        raise ConfigError(f"{name}: {short(content)} is not a mapping; allowed: {allowed}")
     return content
+
+
+def spelt_out(text: str) -> str:
+    """A text as a terminal may show it: what would steer a terminal, as a key may, is spelt out: ESC as x1b."""
+    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
 
 
 def merged(base: Mapping[str, Any], *overlays: Mapping[str, Any]) -> dict[str, Any]:
@@ -60,19 +65,20 @@ def check_overlays(command: Sequence[str]) -> None:
 
 
 def _read(path: Path | str, loader: type[yaml.FullLoader | yaml.SafeLoader]) -> Any:
+    name = spelt_out(str(path))
     try:
         if Path(path).stat().st_size > MOST_BYTES:
-            raise ConfigError(f"{path}: is too large for settings; allowed: at most {MOST_BYTES} bytes")
+            raise ConfigError(f"{name}: is too large for settings; allowed: at most {MOST_BYTES} bytes")
         content = yaml.load(Path(path).read_text(encoding="utf-8"), loader)
         _bound(content)
     except RecursionError:
-        raise ConfigError(f"{path}: is nested too deep; allowed: {DEEPEST} levels") from None
+        raise ConfigError(f"{name}: is nested too deep; allowed: {DEEPEST} levels") from None
     except yaml.MarkedYAMLError as error:
         place = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise ConfigError(f"{path}{place}: cannot be read as YAML: {flat(error.problem)}") from None
+        raise ConfigError(f"{name}{place}: cannot be read as YAML: {flat(error.problem)}") from None
     except (OSError, ValueError, yaml.YAMLError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise ConfigError(f"{path}: cannot be read as YAML: {flat(reason)}") from None
+        raise ConfigError(f"{name}: cannot be read as YAML: {flat(reason)}") from None
     return content
 
 
