@@ -13,10 +13,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from reacher_shaping.report.loader import load
 from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.settings.outputs import judged, table_files
+from reacher_shaping.settings.outputs import files_of
 from reacher_shaping.settings.study import Study, block_name, load_study, read_settings, settings_hash
 from reacher_shaping.storage.files import ArtifactError, check_seal, read_json, write_json, write_text
 from reacher_shaping.storage.provenance import require_asked
@@ -49,14 +51,9 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
     keep_tables(RESULTS, folder)
-    files = {
-        name: table_files(
-            switches=own.switches is not None,
-            peers=own.peers is not None,
-            claims=judged(cell.key for cell in study.experiment_cells[name]),
-        )
-        for name, own in study.experiments.items()
-    }
+    ledger = yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8"))
+    hypotheses = {entry["study"] for entry in ledger}
+    files = {name: files_of(study, name, hypotheses) for name in study.experiments}
     further = {
         name: manifests(study, study.experiment_cells[name], study.experiments[name].seeds)
         for name in keep_experiments(RESULTS, folder, files)

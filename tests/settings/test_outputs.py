@@ -2,7 +2,7 @@
 
 import pytest
 
-from reacher_shaping.settings.outputs import judged, table_files, views
+from reacher_shaping.settings.outputs import files_of, judged, table_files, views
 from reacher_shaping.settings.study import load_study, read_settings
 
 
@@ -31,7 +31,7 @@ def test_the_studies_of_the_configuration_have_theirs():
         name: views([cell.key for cell in cells], switches=study.experiments[name].switches is not None)
         for name, cells in study.experiment_cells.items()
     }
-    assert found == {
+    expected = {
         "released": ["cells", "log", "correlation", "forest"],
         "attribution": ["cells", "effects"],
         "standard": ["cells", "log", "forest"],
@@ -42,6 +42,21 @@ def test_the_studies_of_the_configuration_have_theirs():
         "long": ["cells", "log"],
         "ablation": ["cells", "effects"],
     }
+    assert {name: found[name] for name in expected} == expected
+
+
+def test_a_study_has_the_tables_that_it_asks_for():
+    study = load_study(read_settings("config.yaml"))
+    files = {name: set(files_of(study, name, {"sparse"})) for name in study.experiments}
+
+    def having(file):
+        return {name for name, own in files.items() if file in own}
+
+    assert having("hypotheses.csv") == {"sparse"}
+    assert having("lengths.parquet") == {"long"}
+    assert having("effects.csv") == {"attribution", "ablation"}
+    assert having("agreement.csv") == {"standard"}
+    assert having("runs.parquet") == set(files)
 
 
 def test_claims_are_judged_where_no_two_protocols_have_the_same_cell():

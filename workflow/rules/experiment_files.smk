@@ -1,7 +1,7 @@
 # What a further study is made of and makes, by its name.
 import yaml
 
-from reacher_shaping.settings.outputs import VIEWS, judged, table_files, views
+from reacher_shaping.settings.outputs import VIEWS, files_of, judged, views
 
 
 def of_experiment(make):
@@ -48,15 +48,7 @@ HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/
 
 def tables_of(experiment):
     """Files of an experiment's tables."""
-    settings = STUDY.experiments[experiment]
-    files = table_files(
-        switches=settings.switches is not None,
-        peers=settings.peers is not None,
-        claims=judged(cell.key for cell in EXPERIMENTS[experiment]),
-        hypotheses=experiment in HYPOTHESES,
-        lengths=settings.lengths,
-    )
-    return [f"results/experiments/{experiment}/{file}" for file in files]
+    return [f"results/experiments/{experiment}/{file}" for file in files_of(STUDY, experiment, HYPOTHESES)]
 
 
 def runs_of(experiment):

@@ -1,9 +1,10 @@
 """What a further study has, by name: its tables' files and its figures. Nothing heavy is loaded, for the workflow."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
+from reacher_shaping.settings.study import Study
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES
 
 VIEWS = ("cells", "dose", "effects", "log", "correlation", "forest")
@@ -24,6 +25,18 @@ def table_files(
     has = {"effects": switches, "agreement": peers, "hypotheses": hypotheses, "lengths": lengths}
     has |= {"claims": claims, "claim_parts": claims}
     return [entry.file for name, entry in EXPERIMENT_TABLES.items() if has.get(name, True)]
+
+
+def files_of(study: Study, name: str, hypotheses: Collection[str]) -> list[str]:
+    """Return the files of a further study's tables; `hypotheses` are the studies that have some of their own."""
+    own = study.experiments[name]
+    return table_files(
+        switches=own.switches is not None,
+        peers=own.peers is not None,
+        claims=judged(cell.key for cell in study.experiment_cells[name]),
+        hypotheses=name in hypotheses,
+        lengths=own.lengths,
+    )
 
 
 def views(keys: Iterable[Mapping[str, Any]], *, switches: bool) -> list[str]:
