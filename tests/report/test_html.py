@@ -300,7 +300,7 @@ def test_first_screen_counts_comparisons_beyond_chance_and_gives_the_effect(inpu
     own = (found["family"] == "none") & (found["metric"] == "success_rate")
     changed = found.assign(p_holm=np.where(own & (found["variant"] == "l2"), 0.01, 0.5))
     first = summary(_changed(inputs, {"comparisons": changed}).study).answers[0]
-    assert "3 of 21 settings differ" in first.because
+    assert "3 of 21 settings differ beyond chance" in first.because
     assert "Success changes by \N{MINUS SIGN}2.0 [\N{MINUS SIGN}5.0, 1.0] points" in first.because
 
 
