@@ -23,6 +23,7 @@ class Project:
 
     def __init__(self, folder: Path, changes: Mapping[str, Any]):
         self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
         for name in ("Snakefile", "profiles", "workflow", "src", "report", "config.yaml"):
             place, ignored = ROOT / name, shutil.ignore_patterns("__pycache__", "*.egg-info", "report.html")
             copy = shutil.copytree if place.is_dir() else shutil.copy

@@ -8,11 +8,13 @@ its record says the settings and the code of this clone; what differs is named a
 """
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -21,7 +23,7 @@ from pathlib import Path, PurePosixPath
 from study import HERE, study
 from verify import crate_problems
 
-from reacher_shaping.jobs import regroup
+from reacher_shaping.jobs import folder_lock, regroup
 from reacher_shaping.jobs.blocks import Block, Codes, blocks, state, state_on_disk
 from reacher_shaping.jobs.regroup import Part
 from reacher_shaping.settings.base import ConfigError
@@ -31,6 +33,8 @@ from reacher_shaping.storage.files import ArtifactError, read_json, seal_of
 from reacher_shaping.storage.provenance import differing
 
 KEPT = ("done", "trained")
+OF_A_BLOCK = re.compile(r"policy\.pt|(?:progress|episodes)\.parquet|monitor/\d+\.monitor\.csv")
+"""Files that a block's record may name; any other could lie outside its folder."""
 
 
 @contextmanager
@@ -43,14 +47,13 @@ def opened(source: Path) -> Iterator[Path]:
         folder = Path(name)
         try:
             with zipfile.ZipFile(source) as packed:
-                for member in packed.namelist():
-                    if PurePosixPath(member).is_absolute() or ".." in PurePosixPath(member).parts:
-                        raise ArtifactError(
-                            source, f"holds {member!r}, a path out of its folder", "give another archive"
-                        )
-                packed.extractall(folder)
-        except (OSError, zipfile.BadZipFile) as error:
+                outside = [name for name in packed.namelist() if name[:1] == "/" or ".." in PurePosixPath(name).parts]
+                if not outside:
+                    packed.extractall(folder)
+        except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
             raise ArtifactError(source, f"is no archive that can be read ({error})", "give another archive") from None
+        if outside:
+            raise ArtifactError(source, f"holds {outside[0]!r}, a path out of its folder", "nothing was taken from it")
         if not (folder / METADATA).exists():
             raise ArtifactError(source, f"holds no {METADATA}", "give an archive of `make archive`")
         problems = [problem.split("; ")[0].replace(f"{folder}/", "") for problem in crate_problems(folder)]
@@ -75,6 +78,9 @@ def parts(folder: Path) -> list[Part]:
         record = read_json(path)
         if not isinstance(record.get("outputs"), dict) or not isinstance(record.get("seeds"), list):
             raise ArtifactError(path, "is no record of a block", "nothing was taken")
+        for name in record["outputs"]:
+            if not OF_A_BLOCK.fullmatch(name):
+                raise ArtifactError(path, f"names {name!r}, no file of a block", "nothing was taken")
         problems = differing(path.parent, record["outputs"])
         if problems:
             raise ArtifactError(
@@ -138,9 +144,10 @@ def make_known(options: list[str], there: Mapping[Path, str]) -> None:
 def main(given: argparse.Namespace) -> None:
     """Take over, make known, and say what was and what was not."""
     settings, codes = study(*given.configfile), Codes(HERE / "workflow/scripts")
-    there = {block: state_on_disk(block, given.directory, settings, codes) for block in blocks(settings)}
+    folder_lock.require_free(given.directory)
     with opened(given.source) as folder:
         found, taken, why = parts(folder), 0, Counter[str]()
+        there = {block: state_on_disk(block, given.directory, settings, codes) for block in blocks(settings)}
         for block, known in there.items():
             if known == "missing" and take(block, found, settings, codes, given.directory):
                 there[block], taken = state_on_disk(block, given.directory, settings, codes), taken + 1
@@ -165,5 +172,5 @@ if __name__ == "__main__":
     parser.add_argument("--configfile", type=Path, nargs="+", default=[], help="settings laid over config.yaml")
     try:
         main(parser.parse_args())
-    except (ArtifactError, ConfigError) as error:
+    except (ArtifactError, ConfigError, folder_lock.FolderTakenError) as error:
         sys.exit(str(error))

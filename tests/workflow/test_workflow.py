@@ -11,15 +11,6 @@ from reacher_shaping import processor
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_json, read_table, sha256
 
-TINY = {
-    "seeds": 2,
-    "seeds_per_block": 1,
-    "evaluation": {"episodes": 20, "radius": 0.02},
-    "grid": [
-        {"group": "main", "variants": ["none"], "budgets": [2048]},
-        {"group": "appendix", "variants": ["decay200k_l2sq"], "budgets": [2048], "alpha0": [0.5]},
-    ],
-}
 FURTHER = {
     "seeds": 1,
     "switches": {
@@ -33,17 +24,15 @@ EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "
 
 
 @pytest.fixture(scope="module")
-def empty(tmp_path_factory) -> Project:
+def empty(tmp_path_factory, toy_settings) -> Project:
     """The project before anything was run."""
-    return Project(tmp_path_factory.mktemp("empty"), TINY)
+    return Project(tmp_path_factory.mktemp("empty"), toy_settings)
 
 
 @pytest.fixture(scope="module")
-def project(tmp_path_factory) -> Project:
+def project(toy_study, tmp_path_factory) -> Project:
     """The project with its toy study run to the end."""
-    project = Project(tmp_path_factory.mktemp("study"), TINY)
-    project.run()
-    return project
+    return toy_study.copied(tmp_path_factory.mktemp("workflow") / "study")
 
 
 def refusal(project: Project) -> str:
@@ -287,8 +276,9 @@ def test_edit_of_a_plot_redraws_and_does_not_train(project):
     assert shown <= set(jobs) <= shown | {"run_notebook", "show_notebook"}
 
 
-def test_setting_of_one_cell_reruns_that_cell_and_what_depends_on_it(project):
-    grid = [TINY["grid"][0] | {"ppo": {"learning_rate": 0.001}}, TINY["grid"][1]]
+def test_setting_of_one_cell_reruns_that_cell_and_what_depends_on_it(project, toy_settings):
+    first, second = toy_settings["grid"]
+    grid = [first | {"ppo": {"learning_rate": 0.001}}, second]
     with project.configured(grid=grid):
         jobs = project.planned()
     for rule in ("train_block", "evaluate_block", "render_media"):
