@@ -35,7 +35,8 @@ def refusal(config):
 
 
 def test_default_grid_is_the_papers_17_and_6_cells():
-    cells = [(cell.variant.name, cell.budget, cell.alpha0) for cell in load_study(ROOT / "config.yaml").cells]
+    design = load_study(ROOT / "config.yaml").design("main")
+    cells = [(cell["variant"], cell["budget"], cell["alpha0"]) for cell in design if cell["group"] != "extra"]
     constant, decay = ["l2", "l2sq"], ["decay200k", "decay300k", "decay500k"]
     main = [(name, budget, 1.0) for name in ["none", *constant, *decay] for budget in (500_000, 1_000_000)]
     half = [(name, 500_000, 0.5) for name in [*constant, *decay]]
@@ -61,7 +62,7 @@ def test_folder_of_a_cell_has_plain_numbers():
     folders = [cell.folder for cell in load_study(DEFAULT).cells]
     assert "paper/l2/500000/alpha0.5" in folders
     assert "paper/none/1000000/alpha1" in folders
-    assert len(set(folders)) == 23
+    assert len(set(folders)) == len(folders)
 
 
 @given(st.floats(min_value=1e-12, max_value=1e12))
@@ -78,7 +79,7 @@ def test_settings_restore_the_cell_and_are_sorted():
 
 def test_settings_of_two_cells_differ_and_name_every_influence():
     settings = [str(cell.settings()) for cell in load_study(DEFAULT).cells]
-    assert len(set(settings)) == 23
+    assert len(set(settings)) == len(settings)
     assert all("root_seed" in text and "learning_rate" in text and "horizon" in text for text in settings)
 
 
@@ -236,7 +237,7 @@ def test_a_label_may_be_given_to_the_baseline():
             {"seeds": 1, "grid": [{"variants": ["none"], "budgets": [4096]}]},
             ["'main'", "other name"],
         ),
-        ("variants.l2.potential", "l3", ["variants.l2.potential = 'l3'", "'none', 'l2' or 'l2sq'"]),
+        ("variants.l2.potential", "l3", ["variants.l2.potential = 'l3'", "should be 'none', 'l2'"]),
         ("variants.l2; rm -rf", {"potential": "l2"}, ["l2; rm -rf", "pattern"]),
         ("variants.l2", None, ["variants.l2 = None", "mapping"]),
         ("variants.none.potential", "l2", ["potential = 'l2'", "'none'", "baseline"]),
@@ -305,7 +306,7 @@ def test_file_that_is_no_mapping_is_refused_by_name(tmp_path, text):
 def test_a_whole_number_may_have_an_exponent(value):
     cells = load_study(changed("grid.2.budgets", [value])).cells
     assert [type(cell.budget) for cell in cells] == [int] * len(cells)
-    assert cells[-1].folder == "paper/decay500k_l2sq/500000/alpha0.5"
+    assert "paper/decay500k_l2sq/500000/alpha0.5" in {cell.folder for cell in cells}
 
 
 def test_missing_file_is_refused_by_name(tmp_path):
