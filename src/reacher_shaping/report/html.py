@@ -41,6 +41,7 @@ from reacher_shaping.report.text_tables import (
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
 SORTABLE = Path(__file__).parent / "vendor" / "sortable.js"
+ARM = Path(__file__).with_name("arm.js")
 OWN_SECTION = ("lottery", "peers")  # figures that stand in a section of their own; other further ones come together
 NOTEBOOKS = "notebooks"
 RELEASED = "released"  # the study that computes as the released code does

@@ -1,15 +1,34 @@
-"""What a further study has, by name: its tables' files and its figures. Nothing heavy is loaded, for the workflow."""
+"""What a study has, by name: a further one's tables and figures, policies to show. Nothing heavy, for the workflow."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
+from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.study import Study
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES
 
 VIEWS = ("cells", "dose", "effects", "log", "correlation", "forest")
 DOSES = 3
 """Weights of one variant from which on its effect is shown against the weight."""
+
+SHOWN = {
+    "none": ("paper", "none"),
+    "l2": ("paper", "l2"),
+    "decay300k": ("paper", "decay300k"),
+    "released": ("released", "decay300k"),
+    "tuned": ("tuned", "none"),
+}
+"""Policies that the page lets its reader play: protocol and variant, by the name that the words know."""
+
+
+def shown_cells(cells: Iterable[Cell]) -> dict[str, Cell]:
+    """Return, by name, the cells whose first run the page shows: of each kind the one of most budget and alpha0."""
+    found: dict[str, Cell] = {}
+    for cell in sorted(cells, key=lambda cell: (cell.budget, cell.alpha0)):
+        kind = (cell.protocol.name, cell.variant.name)
+        found |= {name: cell for name, shown in SHOWN.items() if shown == kind}
+    return {name: found[name] for name in SHOWN if name in found}
 
 
 def judged(keys: Iterable[Mapping[str, Any]]) -> bool:
