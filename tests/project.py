@@ -19,10 +19,13 @@ ROOT = Path(__file__).parents[1]
 
 
 class Project:
-    """A copy of the project in `folder`, with `changes` laid over its config.yaml."""
+    """A copy of the project in `folder`, with `changes` laid over its config.yaml.
+
+    `environment` are variables that its commands have besides those of the tests, None for one that they have not.
+    """
 
     def __init__(self, folder: Path, changes: Mapping[str, Any]):
-        self.folder = folder
+        self.folder, self.environment = folder, dict[str, str | None]()
         folder.mkdir(parents=True, exist_ok=True)
         for name in ("Snakefile", "profiles", "workflow", "src", "report", "config.yaml"):
             place, ignored = ROOT / name, shutil.ignore_patterns("__pycache__", "*.egg-info", "report.html")
@@ -35,12 +38,13 @@ class Project:
         """A copy of all that is there by now."""
         shutil.copytree(self.folder, folder)
         project = object.__new__(Project)
-        project.folder = folder
+        project.folder, project.environment = folder, {}
         return project
 
     def start(self, *arguments: str) -> subprocess.Popen:
         """Start Python on the copy, in a process group of its own."""
-        environment = os.environ | {"PYTHONPATH": str(self.folder / "src")}
+        wanted = {"PYTHONPATH": str(self.folder / "src")} | self.environment
+        environment = {name: value for name, value in (os.environ | wanted).items() if value is not None}
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         command = [sys.executable, *arguments]
         # What a shell runs in the background ignores Ctrl-C, and so would all it starts.

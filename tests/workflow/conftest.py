@@ -35,3 +35,9 @@ def toy_study(tmp_path_factory) -> Project:
 def toy_settings() -> dict:
     """What is laid over config.yaml for it."""
     return TOY
+
+
+@pytest.fixture
+def copy(toy_study, tmp_path) -> Project:
+    """A copy of the toy study to change."""
+    return toy_study.copied(tmp_path / "copy")

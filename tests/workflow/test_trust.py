@@ -9,27 +9,8 @@ from project import ROOT, Project
 from reacher_shaping.storage.files import read_json, seal_of, sha256
 from reacher_shaping.storage.reference import checksums
 
-STUDY = {
-    "seeds": 1,
-    "seeds_per_block": 1,
-    "evaluation": {"episodes": 10, "radius": 0.02},
-    "grid": [{"variants": ["none", "l2"], "budgets": [2048]}],
-}
-NONE, L2 = (f"results/paper/{name}/2048/alpha1/seeds0-0" for name in ("none", "l2"))
+NONE, DECAY = "results/paper/none/2048/alpha1/seeds0-0", "results/paper/decay200k_l2sq/2048/alpha0.5/seeds0-0"
 SHOWN = ["--allowed-rules", "build_report", "build_crate", "--", "report/report.html", "ro-crate-metadata.json"]
-
-
-@pytest.fixture(scope="module")
-def study(tmp_path_factory) -> Project:
-    """The toy study, run to the end."""
-    project = Project(tmp_path_factory.mktemp("study"), STUDY)
-    project.run()
-    return project
-
-
-@pytest.fixture
-def copy(study, tmp_path) -> Project:
-    return study.copied(tmp_path / "copy")
 
 
 def refusal(project: Project, *arguments: str) -> str:
@@ -41,37 +22,39 @@ def refusal(project: Project, *arguments: str) -> str:
     return lines[0]
 
 
-def with_ppo(**settings) -> list[dict]:
-    return [STUDY["grid"][0] | {"ppo": settings}]
+def faster(settings: dict) -> dict:
+    """The grid with another learning rate for `none`."""
+    first, *others = settings["grid"]
+    return {"grid": [first | {"ppo": {"learning_rate": 0.01}}, *others]}
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"grid": with_ppo(learning_rate=0.01)}, "ppo.learning_rate = 0.0003, where 0.01 is asked for"),
-        ({"evaluation": {"episodes": 10, "radius": 0.05}}, "settings.radius = 0.02, where 0.05 is asked for"),
-        ({"evaluation": {"episodes": 20, "radius": 0.02}}, "evaluation.settings.episodes = 10, where 20 is asked"),
+        (faster, "ppo.learning_rate = 0.0003, where 0.01 is asked for"),
+        ({"evaluation": {"episodes": 20, "radius": 0.05}}, "settings.radius = 0.02, where 0.05 is asked for"),
+        ({"evaluation": {"episodes": 30, "radius": 0.02}}, "evaluation.settings.episodes = 20, where 30 is asked"),
         ({"root_seed": 5}, "root_seed"),
     ],
     ids=["learning rate", "radius", "episodes", "root seed"],
 )
-def test_report_of_runs_with_other_settings_than_the_configs_is_refused(copy, changes, said):
-    with copy.configured(**changes):
+def test_report_of_runs_with_other_settings_than_the_configs_is_refused(copy, toy_settings, changes, said):
+    with copy.configured(**(changes(toy_settings) if callable(changes) else changes)):
         line = refusal(copy, *SHOWN)
     assert f"{NONE}/manifest.json: tells of" in line
     assert said in line
 
 
-def test_copy_without_snakemakes_records_is_never_shown_with_other_settings(copy):
+def test_copy_without_snakemakes_records_is_never_shown_with_other_settings(copy, toy_settings):
     shutil.rmtree(copy.folder / ".snakemake")
     assert copy.planned() == {}
-    with copy.configured(grid=with_ppo(learning_rate=0.01)):
+    with copy.configured(**faster(toy_settings)):
         done = copy.snakemake()
         assert done.returncode != 0
         assert f"{NONE}/training.json: tells of settings.cell.protocol.ppo.learning_rate = 0.0003" in done.stderr
         assert "Traceback" not in done.stderr
         shutil.rmtree(copy.folder / "results/paper")
-        assert len(copy.planned()["train_block"]) == 2 * 4, "deleted as told, they are trained"
+        assert len(copy.planned()["train_block"]) == 4 * 4, "deleted as told, they are trained"
 
 
 READERS = {
@@ -86,23 +69,36 @@ READERS = {
 """Jobs that read blocks, each with one of its files; from the end on, as a failed job's files are deleted."""
 
 
+def exchange(project: Project, one: str, other: str) -> None:
+    first, second, aside = (project.folder / folder for folder in (one, other, "aside"))
+    first.rename(aside), second.rename(first), aside.rename(second)
+
+
 def test_exchanged_blocks_are_refused_wherever_they_are_read(copy):
-    none, l2, other = (copy.folder / folder for folder in (NONE, L2, "other"))
-    none.rename(other), l2.rename(none), other.rename(l2)
+    exchange(copy, NONE, DECAY)
     for rule, target in READERS.items():
         line = refusal(copy, "--forcerun", rule, "--allowed-rules", rule, "--", target)
-        assert "tells of settings.cell.variant.name = l2, where none is asked for" in line, rule
+        assert f"{NONE}/" in line
+        assert "tells of settings.cell.alpha0 = 0.5, where 1.0 is asked for" in line, rule
+
+
+def test_exchanged_seeds_are_refused(copy):
+    exchange(copy, NONE, NONE.replace("seeds0-0", "seeds1-1"))
+    line = refusal(
+        copy, "--forcerun", "aggregate_runs", "--allowed-rules", "aggregate_runs", "--", "results/runs.parquet"
+    )
+    assert f"{NONE}/manifest.json: tells of seeds = [1], where [0] is asked for" in line
 
 
 EDITED = [
     "figures/figure_2.svg",
     "results/notebooks/story.ipynb",
-    f"{L2}/monitor/0.monitor.csv",
+    f"{DECAY}/monitor/0.monitor.csv",
     "figures/forest.pdf",
     "results/tables/table_2.md",
-    "results/media/paper-l2-2048-alpha1.mp4",
-    f"{L2}/long_episodes.parquet",
-    f"{L2}/manifest.json",
+    "results/media/paper-decay200k_l2sq-2048-alpha0.5.mp4",
+    f"{DECAY}/long_episodes.parquet",
+    f"{DECAY}/manifest.json",
 ]
 
 
@@ -133,30 +129,32 @@ def test_edit_by_hand_gets_into_no_crate(copy, name):
     assert not crate.exists() or crate.read_bytes() == before, "the old one names the edit"
 
 
-def test_every_file_of_the_crate_has_its_makers_checksum(study):
-    listed = [entity["@id"] for entity in read_json(study.folder / "ro-crate-metadata.json")["@graph"]
+def test_every_file_of_the_crate_has_its_makers_checksum(toy_study):
+    listed = [entity["@id"] for entity in read_json(toy_study.folder / "ro-crate-metadata.json")["@graph"]
               if entity["@type"] == "File"]  # fmt: skip
-    blocks = {path.parent: read_json(path)["outputs"] for path in study.folder.glob("results/*/*/*/*/*/manifest.json")}
-    inside = {str((folder / name).relative_to(study.folder)) for folder, names in blocks.items() for name in names}
+    blocks = {
+        path.parent: read_json(path)["outputs"] for path in toy_study.folder.glob("results/*/*/*/*/*/manifest.json")
+    }
+    inside = {str((folder / name).relative_to(toy_study.folder)) for folder, names in blocks.items() for name in names}
     for name in listed:
-        seal = seal_of(study.folder / name)
-        assert name in inside or seal.read_text().strip() == sha256(study.folder / name), name
+        seal = seal_of(toy_study.folder / name)
+        assert name in inside or seal.read_text().strip() == sha256(toy_study.folder / name), name
 
 
-def test_unpacked_archive_still_knows_what_its_files_were(study, tmp_path):
-    done = study.python("workflow/archive.py", ".", str(tmp_path / "study.zip"))
+def test_unpacked_archive_still_knows_what_its_files_were(toy_study, tmp_path):
+    done = toy_study.python("workflow/archive.py", ".", str(tmp_path / "study.zip"))
     assert done.returncode == 0, done.stderr
     shutil.unpack_archive(tmp_path / "study.zip", tmp_path / "out")
     figure = tmp_path / "out/figures/figure_1.svg"
     figure.write_text(figure.read_text() + " ")
     (tmp_path / "out/ro-crate-metadata.json").unlink()
-    named = study.python("workflow/verify.py", str(tmp_path / "out"))
+    named = toy_study.python("workflow/verify.py", str(tmp_path / "out"))
     assert named.returncode == 1
     assert f"{figure}: has changed" in named.stdout
 
 
 def test_blocks_of_different_versions_are_named(copy):
-    manifest = copy.folder / L2 / "manifest.json"
+    manifest = copy.folder / DECAY / "manifest.json"
     text = manifest.read_text()
     mujoco = read_json(manifest)["versions"]["mujoco"]
     manifest.write_text(text.replace(f'"mujoco": "{mujoco}"', '"mujoco": "3.3.7"'))
@@ -183,7 +181,7 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     before, text = checksums(kept), readme.read_text()
     done = keep(copy)
     assert done.returncode == 1
-    assert "it has 2 runs of the main study" in done.stderr
+    assert "it has 4 runs of the main study" in done.stderr
     assert done.stderr.count("\n") == 1
     assert (checksums(kept), readme.read_text()) == (before, text)
     with copy.edited("workflow/keep_reference.py", "    check_seal(figure)", "    __import__('os').kill(0, 9)"):
@@ -193,7 +191,12 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     assert done.returncode == 0, done.stderr
     record = read_json(kept / "manifest.json")
     assert record["tables"] == checksums(kept)
-    assert record["blocks"][1]["cell"] == {"protocol": "paper", "variant": "l2", "budget": 2048, "alpha0": 1.0}
+    assert record["blocks"][2]["cell"] == {
+        "protocol": "paper",
+        "variant": "decay200k_l2sq",
+        "budget": 2048,
+        "alpha0": 0.5,
+    }
     assert readme.read_text() != text
     (kept / "claims.csv").write_text("edited")
     assert "report/reference/claims.csv: has changed since it was made" in copy.python("workflow/verify.py").stdout
