@@ -11,7 +11,7 @@ from reacher_shaping.jobs import search
 from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.cell import PPO, Environment, Protocol, Variant
 from reacher_shaping.settings.search import Search
-from reacher_shaping.settings.study import load_study
+from reacher_shaping.settings.study import load_study, read_settings
 
 ROOT = Path(__file__).parents[2]
 L2 = Variant(name="l2", potential="l2")
@@ -140,6 +140,26 @@ def test_score_is_that_of_real_runs():
     assert set(found) == set(search.MEASURES)
     assert -200 < found["mean_return"] < -5
     assert 0 <= found["final_success_rate"] <= found["success_rate"] <= 1
+
+
+def test_the_same_search_can_be_made_without_shaping():
+    config = read_settings(ROOT / "config.yaml")
+    shaped = config["search"]
+    config["search"] = shaped | {
+        "variant": "none",
+        "space": {name: own for name, own in shaped["space"].items() if name != "alpha0"},
+    }
+    study = load_study(config)
+    spec, first = study.search, load_study(ROOT / "config.yaml").search
+    assert (spec.trials, spec.seeds, spec.budget) == (first.trials, first.seeds, first.budget)
+    assert spec.space.keys() == first.space.keys() - {"alpha0"}
+    assert spec.cell(study.protocols["standard"], study.variants["none"], spec.corners()[0]).alpha0 == 1
+
+
+def test_study_of_the_searched_settings_says_that_none_had_no_search_of_its_own():
+    study = load_study(ROOT / "config.yaml")
+    assert study.search.variant == "l2"
+    assert "the comparison of the two is tilted towards shaping" in study.experiments["tuned"].question
 
 
 def test_the_tuned_protocol_is_the_best_trial_of_the_kept_search():

@@ -304,6 +304,23 @@ def test_first_screen_counts_comparisons_beyond_chance_and_gives_the_effect(inpu
     assert "Success changes by \N{MINUS SIGN}2.0 [\N{MINUS SIGN}5.0, 1.0] points" in first.because
 
 
+def test_picture_gives_no_interval_to_what_was_chosen_for_being_the_highest(inputs):
+    bars = {bar.name: bar for bar in summary(inputs.study).bars if bar.ours}
+    best = bars["ours, best of 21 shaped"]
+    assert np.isfinite([bars["ours, no shaping"].low, bars["ours, no shaping"].high]).all()
+    assert np.isnan([best.low, best.high]).all()
+
+
+def test_report_says_what_its_intervals_do_not_know(inputs):
+    page = " ".join(html.build(inputs).split())
+    for words in (
+        "Other resets would move all rates together by up to their binomial error",
+        "a run that never gets there counted at its whole budget",
+        "They were chosen for being the highest",
+    ):
+        assert words in page, words
+
+
 def test_first_screen_names_the_published_run_that_the_tables_leave_out(inputs):
     left_out = pd.DataFrame(
         {"variant": ["none"], "budget": [500_000], "alpha0": [0.5], "run": ["lucky"], "success_rate": [0.296]}

@@ -279,12 +279,15 @@ def bars(study: Study, protocol: str | None = None) -> list[Bar]:
         for name, value in zip(("published_none", "published_best"), _published_extremes(study.published), strict=True):
             found.append(Bar(say(f"first.bars.{name}"), value, nan, nan, ours=False))
     shaped = cells[cells["variant"] != "none"].sort_values("success_rate").to_dict("records")
-    ours = {"none": _plain(study, protocol), "best": shaped[-1] if shaped else None}
-    ours["solved"] = _best(study)
-    for name, row in ours.items():
-        if row:
-            limits = (float(row["success_rate_low"]), float(row["success_rate_high"]))
-            found.append(Bar(say(f"first.bars.{name}"), float(row["success_rate"]), *limits, ours=True))
+    plain, best = _plain(study, protocol), _best(study)
+    if plain:
+        limits = (float(plain["success_rate_low"]), float(plain["success_rate_high"]))
+        found.append(Bar(say("first.bars.none"), float(plain["success_rate"]), *limits, ours=True))
+    if shaped:  # the interval of a cell does not know that it was chosen for being the highest
+        name = say("first.bars.best", count=len(shaped))
+        found.append(Bar(name, float(shaped[-1]["success_rate"]), nan, nan, ours=True))
+    if best:
+        found.append(Bar(say("first.bars.solved"), float(best["success_rate"]), nan, nan, ours=True))
     return [bar for bar in found if np.isfinite(bar.value)]
 
 
