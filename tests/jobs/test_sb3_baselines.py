@@ -12,6 +12,8 @@ import pytest
 import synthetic
 from cells import cell
 
+from reacher_shaping.figures.drawing import draw
+from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.jobs import progress, sb3_baselines
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.parts import Evaluation
@@ -130,7 +132,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     made = [name for name in report if name.startswith(("figures/figure_", "results/tables/", "report/notebooks/"))]
     _touch(tmp_path, made)  # only what shows the peers is made
     other = tmp_path / "seeds.yaml"
-    other.write_text("seeds: 77\n")
+    other.write_text("seeds: 77\nevaluation: {radius: 0.05}\n")
     rules = ["judge_claims", "plot_figures", "build_reference_report"]
     _snakemake(tmp_path, "--configfile", other, "--forcerun", "judge_claims", "--allowed-rules", *rules)
     claims = read_table(tmp_path / "results" / "claims.csv", schemas.CLAIMS).set_index("id")
@@ -138,4 +140,10 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     assert (tmp_path / "figures" / "peers.svg").exists()
     report = (tmp_path / "report" / "reference.html").read_text(encoding="utf-8")
     assert "TD3 100K (3 seeds)" in report
-    assert read_json(KEPT / "manifest.json")["settings_hash"] in report, "of the run, not of the config now"
+    kept = read_json(KEPT / "manifest.json")  # what is told and drawn is of that run, not of the config now
+    radius = kept["study"]["evaluation"]["radius"]
+    assert kept["settings_hash"] in report
+    assert f"within {1000 * radius:g} mm of the target" in report
+    drawn = draw("success_by_radius", {"radii": read_table(tmp_path / "results/radii.parquet", schemas.RADII),
+                                       "radius": radius})  # fmt: skip
+    assert (tmp_path / "figures/success_by_radius.svg").read_bytes() == to_bytes(drawn, "svg")
