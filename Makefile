@@ -61,7 +61,7 @@ restore: $(READY) ## the blocks of an archived study, so that nothing of it is t
 report: $(READY) ## figures, tables, notebooks and report again: of results/, or of the reference run where there are none
 ifneq ($(wildcard results/runs.parquet),)
 	@python workflow/unlock.py .
-	$(SNAKEMAKE) --allowed-rules $(FROM_TABLES) build_report build_crate --forcerun run_notebook build_report \
+	$(SNAKEMAKE) --allowed-rules $(FROM_TABLES) show_policies build_report build_crate --forcerun run_notebook build_report \
 		-- report/report.html ro-crate-metadata.json
 	@echo "The report: $(CURDIR)/report/report.html"
 else

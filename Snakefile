@@ -60,6 +60,7 @@ rule all:
         FORMATTED_TABLES,
         NOTEBOOKS,
         MEDIA,
+        SHOWN_FILES,
         "results/check.txt",
         [path for name in MADE for path in runs_of(name)],
         MADE_FIGURES,

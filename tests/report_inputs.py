@@ -9,8 +9,12 @@ from matplotlib.figure import Figure
 
 from reacher_shaping.analysis import comparisons, single_seed_studies
 from reacher_shaping.analysis.scores import scores_frame
+from reacher_shaping.evaluation import shown_policies
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import html, loader
+from reacher_shaping.settings.study import load_study
+from reacher_shaping.storage.files import write_json
+from reacher_shaping.storage.policy_format import weights_checksum, write_policy
 
 ROOT = Path(__file__).parents[1]
 
@@ -48,10 +52,23 @@ def make(folder, study, grid, seeds, **changes):
     kept = changes.pop("only", tables)
     tables = {name: table for name, table in tables.items() if name in kept}
     published = synthetic.published()
+    (folder / "policies").mkdir()
+    cell = load_study(ROOT / "config.yaml").cells[0]
+    start = shown_policies.untrained(cell, 0)
+    write_policy(folder / "policies" / "untrained.pt", [0], start.weights(), {"cell": cell.settings()})
+    acts = {"untrained": start.act, "controller": shown_policies.controller(cell)[0]}
+    shown = {
+        name: shown_policies.measured(act, cell, mode="stochastic", episodes=2, radius=0.02)
+        for name, act in acts.items()
+    }
+    shown["untrained"] |= {"cell": cell.name, "seed": 0, "weights": weights_checksum(start.weights())}
+    shown["controller"]["gains"] = shown_policies.controller(cell)[1]
+    write_json(folder / "policies" / "policies.json", shown)
     files = loader.Study(tables, {}, published, published, pd.DataFrame(), synthetic.ledger())
     given = {
         "settings": study, "study": files, "figures": paths,
         "media": sorted((folder / "media").iterdir()), "manifests": [MANIFEST] * 3,
+        "policies": folder / "policies" / "policies.json",
         "notebooks": [folder / "results" / "notebooks" / "story.html"], "settings_hash": "ab" * 32,
     }  # fmt: skip
     return html.Inputs(**(given | changes))

@@ -2,6 +2,10 @@
 
     python workflow/keep_reference.py [--force] [OVERLAY.yaml]
 
+    python workflow/keep_reference.py --policies [OVERLAY.yaml]
+
+keeps the policies of `results/policies` alone, and leaves all else of the reference run as it is.
+
 The folder is made anew beside the old one and takes its place whole. Ends with 1, and changes nothing, where something
 would be lost or a block cannot be traced to a commit; --force keeps the run all the same.
 """
@@ -23,8 +27,10 @@ from reacher_shaping.settings.study import Study, block_name, load_study, read_s
 from reacher_shaping.storage.files import ArtifactError, check_seal, read_json, write_json, write_text
 from reacher_shaping.storage.provenance import require_asked
 from reacher_shaping.storage.reference import (
+    POLICIES,
     checksums,
     keep_experiments,
+    keep_policies,
     keep_tables,
     manifest,
     objections,
@@ -51,6 +57,7 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
     keep_tables(RESULTS, folder)
+    keep_policies(RESULTS, folder, KEPT)
     ledger = yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8"))
     hypotheses = {entry["study"] for entry in ledger}
     files = {name: files_of(study, name, hypotheses) for name in study.experiments}
@@ -71,8 +78,14 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Make the run in results/ the reference run.")
     parser.add_argument("overlay", nargs="*", help="a YAML file laid over config.yaml")
+    parser.add_argument("--policies", action="store_true", help="keep its policies alone")
     parser.add_argument("--force", action="store_true", help="whatever is lost by it")
     options = parser.parse_args()
+    if options.policies:
+        keep_policies(RESULTS, KEPT, KEPT)
+        write_json(KEPT / "manifest.json", read_json(KEPT / "manifest.json") | {"tables": checksums(KEPT)})
+        print(f"The reference run's policies: {KEPT / POLICIES}")
+        return
     study = load_study(read_settings("config.yaml", *options.overlay))
     with replaced(KEPT) as folder:
         record = write_folder(study, folder)

@@ -8,7 +8,7 @@ import pytest
 
 from reacher_shaping.evaluation import shown_policies
 from reacher_shaping.evaluation.evaluate import evaluate
-from reacher_shaping.report import html
+from reacher_shaping.report import arm
 from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.settings.study import load_study
 from reacher_shaping.tasks.base import Lanes, load_task
@@ -27,7 +27,7 @@ def page():
         opened = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
         page = opened.new_page()
         page.goto("about:blank")
-        page.add_script_tag(path=html.ARM)
+        page.add_script_tag(path=arm.SCRIPT)
         yield page
         opened.close()
 
@@ -120,5 +120,8 @@ def test_shown_policy_is_what_the_summary_says(cell):
         environment=cell.protocol.environment, root_seed=cell.root_seed,
     )  # fmt: skip
     assert told["touched"] == rows["success"].mean()
-    near = np.linalg.norm(np.subtract(told["path"], told["target"]), axis=1)[1:].min()
+    near = np.linalg.norm(
+        np.subtract([[float(one) for one in point.split(",")] for point in told["path"].split()], told["target"]),
+        axis=1,
+    )[1:].min()
     assert near == pytest.approx(1000 * rows["min_distance"][0], abs=0.3)  # mm

@@ -3,6 +3,7 @@
 Debian's chromium is driven through its path; where there is none, or no playwright, the tests are skipped.
 """
 
+import re
 import shutil
 
 import pytest
@@ -125,8 +126,35 @@ def test_a_link_opens_its_claim_and_verdicts_filter(visit):
     assert not page.locator("#C3").is_visible()
 
 
+def test_a_dragged_target_starts_an_episode_that_is_told(visit):
+    page = visit(WIDE, "#arm")
+    page.locator("[data-part=policy]").select_option("controller")
+    page.locator("[data-part=longer]").uncheck()
+    box = page.locator("[data-part=target]").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 30, y + 40)
+    page.mouse.up()
+    moved = page.locator("[data-part=target]").bounding_box()
+    assert moved["x"] - box["x"] == pytest.approx(-30, abs=2)
+    page.wait_for_function("document.querySelector('[data-part=count]').textContent.includes('100 %')")
+    assert "on the target" in page.locator("[data-part=said]").text_content()
+
+
+def test_many_episodes_of_an_untrained_network_touch_often_and_end_seldom(visit):
+    page = visit(WIDE, "#arm")
+    page.locator("[data-part=policy]").select_option("untrained")
+    page.locator("[data-part=many]").click()
+    touched, ended = re.findall(r"(\d+) %", page.locator("[data-part=count]").text_content())
+    assert 8 < int(touched) < 35
+    assert int(ended) < 6
+
+
 def test_everything_can_be_read_without_scripts(visit):
     page = visit(WIDE, java_script_enabled=False)
     page.locator("#C1 summary").click()
     assert page.locator("#C1 dl").is_visible()
     assert not page.locator("#verdicts").is_visible()
+    assert page.locator("#arm .paths svg").count() == 2
+    assert not page.locator("#player").is_visible()

@@ -1,4 +1,6 @@
 # From a trained policy to a video of one evaluation episode, for each cell.
+from reacher_shaping.settings.outputs import shown_cells
+
 CELL_NAMES = {cell.name: cell for cell in STUDY.cells}
 MEDIA = expand("results/media/{name}.{kind}", name=CELL_NAMES, kind=["gif", "mp4"])
 
@@ -34,3 +36,40 @@ rule render_media:
         code=code("render_media"),
     script:
         "../scripts/render_media.py"
+
+
+# From the policies of a few cells to those that the report's page lets its reader play: one run each, 20 kB.
+SHOWN_CELLS = shown_cells([*STUDY.cells, *(cell for name in MADE for cell in EXPERIMENTS[name])])
+
+
+SHOWN = "results/policies/policies.json"
+SHOWN_FILES = [SHOWN, *(f"results/policies/{name}.pt" for name in ["untrained", *SHOWN_CELLS] if SHOWN_CELLS)]
+SHOWN_SEEDS = [
+    next(iter(STUDY.blocks(STUDY.seeds if cell in STUDY.cells else seeds_of(cell)))) for cell in SHOWN_CELLS.values()
+]
+SHOWN_BLOCKS = [f"results/{cell.folder}/{block_name(seeds)}" for cell, seeds in zip(SHOWN_CELLS.values(), SHOWN_SEEDS)]
+
+
+rule show_policies:
+    input:
+        policies=expand("{block}/policy.pt", block=SHOWN_BLOCKS),
+        trainings=ancient(expand("{block}/training.json", block=SHOWN_BLOCKS)),
+    output:
+        summary=SHOWN,
+        policies=SHOWN_FILES[1:],
+    log:
+        "results/logs/show_policies.log",
+    benchmark:
+        "results/benchmarks/show_policies.tsv"
+    threads: 1
+    resources:
+        mem_mb=growing(1500),
+        runtime=growing(10),
+    params:
+        names=list(SHOWN_CELLS),
+        asked=[as_json(asked(cell, seeds)) for cell, seeds in zip(SHOWN_CELLS.values(), SHOWN_SEEDS)],
+        episodes=STUDY.evaluation.episodes,
+        radius=STUDY.evaluation.radius,
+        code=code("show_policies", tasks_of(SHOWN_CELLS.values())),
+    script:
+        "../scripts/show_policies.py"

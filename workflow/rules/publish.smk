@@ -15,6 +15,7 @@ rule build_crate:
             FORMATTED_TABLES,
             NOTEBOOKS,
             MEDIA,
+            SHOWN_FILES,
             PEERS,
             MADE_TABLES,
             MADE_FIGURES,

@@ -38,6 +38,7 @@ with logged(snakemake):
         figures={Path(path).stem: Path(path) for path in given.figures if path.endswith(".svg")},
         media=[Path(path) for path in given.media],
         notebooks=[Path(path) for path in given.notebooks],
+        policies=next((Path(path) for path in given.policies), None),
         headings=now["experiments"],
         manifests=[block for record in records for block in record.get("blocks", [record])],
         template=Path(given.template),

@@ -33,7 +33,8 @@ def controller(cell: Cell) -> tuple[Actor, list[float]]:
 def measured(act: Actor, cell: Cell, *, mode: Mode, episodes: int, radius: float) -> dict[str, Any]:
     """What a policy of one run did: the shares of episodes that `touched` the target and that `ended` on it.
 
-    `target` [x, y] and `path` [T + 1][x, y], the fingertip's, are those of the first of them, in mm.
+    `target` [x, y] and `path`, where the fingertip was at the start and after each step, `x,y x,y ...`, are of the
+    first, in mm.
     """
     environment, root_seed = cell.protocol.environment, cell.root_seed
     rows = evaluate(act, [0], mode=mode, episodes=episodes, radius=radius, environment=environment, root_seed=root_seed)
@@ -44,14 +45,14 @@ def measured(act: Actor, cell: Cell, *, mode: Mode, episodes: int, radius: float
         "touched": float(rows["success"].mean()),
         "ended": float(rows["final_success"].mean()),
         "target": np.round(1000 * first.positions[0, 2:], 1).tolist(),
-        "path": np.round(1000 * path, 1).tolist(),
+        "path": " ".join(f"{x:.1f},{y:.1f}" for x, y in 1000 * path),
     }
 
 
 def acting_numbers(weights: Mapping[str, Tensor]) -> bytes:
     """All that one run's policy acts by, as float32: of each layer the rows of its weights, then its biases.
 
-    The two hidden layers, the means of the torques, then the logarithm of their deviations. `weights` are those of the
+    The two hidden layers, the means of the torques, then the logarithm of their deviations. `weights` are of the
     run alone, [1, ...]; the part that guesses values is left out.
     """
     trunk = "policy_trunk" if "policy_trunk.0.weight" in weights else "shared"

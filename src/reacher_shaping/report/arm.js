@@ -152,7 +152,7 @@ const arm = (() => {
       const state = run.states[shown], points = [[0, 0], elbow(state.q), tip(state.q)];
       const list = all => all.map(([x, y]) => `${(1000 * x).toFixed(1)},${(-1000 * y).toFixed(1)}`).join(" ");
       part("links").setAttribute("points", list(points));
-      part("trail").setAttribute("points", list(run.states.slice(0, shown + 1).map(one => tip(one.q))));
+      part("trail").setAttribute("points", list(run.states.slice(Math.max(0, shown - STEPS), shown + 1).map(one => tip(one.q))));
       for (const name of ["tip", "target", "goal"]) {
         const [x, y] = name === "tip" ? points[2] : target;
         part(name).setAttribute("cx", 1000 * x);
@@ -216,13 +216,13 @@ const arm = (() => {
       const frame = picture.getBoundingClientRect();
       move(SHOWN * (2 * (event.clientX - frame.left) / frame.width - 1), SHOWN * (1 - 2 * (event.clientY - frame.top) / frame.height));
     };
-    picture.addEventListener("pointerdown", event => {
+    const handle = part("target"); // alone, so that a finger elsewhere on the picture scrolls the page
+    handle.addEventListener("pointerdown", event => {
       dragging = true;
-      picture.setPointerCapture(event.pointerId);
-      place(event);
+      handle.setPointerCapture(event.pointerId);
     });
-    picture.addEventListener("pointermove", event => { if (dragging) place(event); });
-    for (const end of ["pointerup", "pointercancel"]) picture.addEventListener(end, () => {
+    handle.addEventListener("pointermove", event => { if (dragging) place(event); });
+    for (const end of ["pointerup", "pointercancel"]) handle.addEventListener(end, () => {
       if (dragging) play();
       dragging = false;
     });
@@ -252,7 +252,7 @@ const arm = (() => {
       count.ended += 200 * found.ended;
       total();
     });
-    part("controls").hidden = false;
+    box.hidden = false;
     prepare();
   };
   return {STEPS, RADIUS, step, tip, distance, observe, network, controller, policyOf, act, episode, rates, generator, mount};

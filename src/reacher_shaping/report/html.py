@@ -16,6 +16,7 @@ from markupsafe import Markup
 from reacher_shaping.analysis.baselines import ALGORITHMS, by_algorithm, peer_table
 from reacher_shaping.labels import budget_label, of_protocol
 from reacher_shaping.report import (
+    arm,
     captions,
     claims_view,
     computation,
@@ -41,7 +42,6 @@ from reacher_shaping.report.text_tables import (
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
 SORTABLE = Path(__file__).parent / "vendor" / "sortable.js"
-ARM = Path(__file__).with_name("arm.js")
 OWN_SECTION = ("lottery", "peers")  # figures that stand in a section of their own; other further ones come together
 NOTEBOOKS = "notebooks"
 RELEASED = "released"  # the study that computes as the released code does
@@ -53,7 +53,7 @@ class Inputs:
 
     `settings` holds the resolved settings; `study` the tables; `figures` maps names such as `figure_1` to SVG files, in
     the order to show; `manifests` are those of the study's blocks; `headings` has the `title` and `question` of each
-    further study.
+    further study; `policies` is the summary of the policies that the page lets its reader play.
     """
 
     settings: Mapping[str, Any]
@@ -63,6 +63,7 @@ class Inputs:
     manifests: Sequence[Mapping[str, Any]] = ()
     headings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     notebooks: Sequence[Path] = ()
+    policies: Path | None = None
     settings_hash: str = ""
     protocol: str | None = None
     template: Path = TEMPLATE
@@ -90,10 +91,12 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     further = [picture for name, picture in drawn.items() if not name.startswith(own) and name not in OWN_SECTION]
     facts = computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol)
     first = summary(study, inputs.protocol)
-    absent = {"further": not further, "rollouts": not videos}
+    played = arm.arm(inputs.policies)
+    absent = {"further": not further, "rollouts": not videos, "arm": not played}
     sections = [name for name in entry("page.sections") if not absent.get(name, False)]
     return {
         "summary": first,
+        "arm": played,
         "first_picture": small_pictures.bars(first.bars, say("first.picture")) if first.bars else "",
         "facts": facts,
         "print_facts": re.sub(r"[\"\\\n]", "", " · ".join(facts)),
@@ -135,6 +138,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         "limits": entry("page.limits"),
         "references": entry("page.references"),
         "sortable": Markup(SORTABLE.read_text(encoding="utf-8")),
+        "arm_script": Markup(arm.SCRIPT.read_text(encoding="utf-8")),
         "script_words": {name: say(f"page.{name}") for name in ("filter", "enlarge", "shrink")},
     }
 

@@ -9,12 +9,22 @@ from typing import Any
 import pandas as pd
 
 from reacher_shaping.storage.block_schemas import Table
-from reacher_shaping.storage.files import read_json, read_table, sha256, write_table
+from reacher_shaping.storage.files import (
+    check_seal,
+    read_json,
+    read_table,
+    sha256,
+    write_bytes,
+    write_json,
+    write_table,
+)
 from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES
 
 _KEPT = [entry for entry in STUDY_TABLES.values() if entry.kept]
 TABLES = {entry.file: entry.schema for entry in _KEPT if entry.always}
 """The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
+POLICIES = "policies"
+"""Folder of the policies that a report shows."""
 OPTIONAL = {entry.file: entry.schema for entry in _KEPT if not entry.always}
 """Tables that are kept with it where the run has them."""
 
@@ -111,6 +121,26 @@ def keep_experiments(results: Path, kept: Path, files: Mapping[str, Sequence[str
             target = kept / "experiments" / name / file
             write_table(target, found[name][stem], EXPERIMENT_TABLES[stem].schema, sealed=False)
     return made
+
+
+def keep_policies(results: Path, kept: Path, before: Path) -> None:
+    """Copy the policies that a report shows, of `results`, into the folder `kept`, and those of `before` that it lacks.
+
+    So those of a study that was not trained here stay. Raises ArtifactError for a damaged file.
+    """
+    shown: dict[str, Any] = {}
+    for folder in (before / POLICIES, results / POLICIES):
+        summary = folder / "policies.json"
+        if not summary.exists():
+            continue
+        found = read_json(summary)
+        for name in found:
+            if (folder / f"{name}.pt").exists():
+                check_seal(folder / f"{name}.pt")
+                write_bytes(kept / POLICIES / f"{name}.pt", (folder / f"{name}.pt").read_bytes())
+        shown |= found
+    if shown:
+        write_json(kept / POLICIES / "policies.json", shown)
 
 
 def _keep(source: Path, target: Path, table: Table) -> None:
