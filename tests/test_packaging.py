@@ -44,6 +44,7 @@ PACKAGE = {
     "markupsafe": "jinja2",  # comes with it, as the next ones with theirs
     "IPython": "ipykernel",
     "glfw": "mujoco",
+    "traitlets": "papermill",
     "boto3": "snakemake-storage-plugin-s3",
     "werkzeug": "moto",
 }

@@ -73,13 +73,14 @@ def test_sources_define_nothing_and_say_their_language(source):
 
 
 @pytest.mark.parametrize(("name", "figures"), [("correlation", 1), ("further_views", 5)])
-def test_a_notebook_run_twice_gives_the_same_bytes(study, monkeypatch, name, figures):
+def test_a_notebook_run_twice_gives_the_same_bytes_and_no_warning(study, monkeypatch, capfd, name, figures):
     monkeypatch.chdir(study)
     parameters = {"results": "results", "published": "report/published"}
     source = next(path for path in SOURCES if path.stem == name)
     outs = [Path("out") / f"{number}.ipynb" for number in (1, 2)]
     for out in outs:
         notebooks.execute(source, out, parameters)
+    assert "WARNING" not in capfd.readouterr().err
     assert outs[0].read_bytes() == outs[1].read_bytes()
     text = outs[0].read_text(encoding="utf-8")
     assert str(study) not in text

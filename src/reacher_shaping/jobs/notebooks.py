@@ -21,9 +21,12 @@ import jupytext
 import nbformat
 import papermill
 from nbconvert import HTMLExporter
+from traitlets.config import Config
 
 from reacher_shaping.storage.files import write_bytes, write_text
 
+ENCRYPTED = Config({"KernelManager": {"transport_encryption": "auto"}})
+"""A kernel warns of any plain connection, though none but its own machine can listen."""
 # What varies between two executions of the same notebook.
 VOLATILE = ("papermill", "execution", "jupytext", "widgets")
 
@@ -73,7 +76,13 @@ def execute(
         nbformat.write(jupytext.read(source), prepared)  # type: ignore[no-untyped-call]
         try:
             papermill.execute_notebook(
-                prepared, executed, parameters, log_output=False, progress_bar=False, cwd=working_folder or Path.cwd()
+                prepared,
+                executed,
+                parameters,
+                log_output=False,
+                progress_bar=False,
+                cwd=working_folder or Path.cwd(),
+                config=ENCRYPTED,
             )
         finally:
             if log is not None and executed.exists():
