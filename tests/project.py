@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from reacher_shaping.settings.study import read_settings
+from reacher_shaping.storage.files import sha256
 
 ROOT = Path(__file__).parents[1]
 
@@ -97,3 +98,10 @@ class Project:
             yield
         finally:
             path.write_text(before)
+
+
+def computed(folder: Path) -> dict[str, str]:
+    """Checksums of what the study in `folder` computed: the files under results/ but those that tell times."""
+    results = folder / "results"
+    files = [path for path in results.rglob("*") if path.is_file() and path.suffix in {".pt", ".parquet", ".csv"}]
+    return {str(path.relative_to(results)): sha256(path) for path in files if "/." not in str(path)}

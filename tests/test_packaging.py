@@ -36,7 +36,12 @@ def test_every_dependency_is_pinned():
 
 
 # Extras whose packages a folder may import, beside those of every installation.
-EXTRAS = {"src": ["s3"], "workflow": [], "tests": ["dev", "bench", "slurm", "s3"], "benchmarks": ["dev", "bench"]}
+EXTRAS = {
+    "src": ["s3"],
+    "workflow": [],
+    "tests": ["dev", "bench", "slurm", "s3", "s3-tests"],
+    "benchmarks": ["dev", "bench"],
+}
 PACKAGE = {
     "yaml": "pyyaml",
     "PIL": "pillow",

@@ -14,36 +14,11 @@ import time
 from pathlib import Path
 
 import pytest
-from project import Project
-
-from reacher_shaping.storage.files import sha256
+from project import Project, computed
 
 KILLS = int(os.environ.get("REACHER_SHAPING_KILLS", "3"))
 TARGET = "results/runs.parquet"
 CELL = "results/paper/l2/61440/alpha1"
-STUDY = {
-    "seeds": 2,
-    "seeds_per_block": 1,
-    "evaluation": {"episodes": 20, "radius": 0.02},
-    "grid": [{"variants": ["l2"], "budgets": [61440]}],
-}
-
-
-def new_project(folder: Path) -> Project:
-    """A study of two blocks that keep a checkpoint after every iteration."""
-    project = Project(folder, STUDY)
-    jobs = folder / "src/reacher_shaping/jobs/training_job.py"
-    often = jobs.read_text().replace("SECONDS_PER_CHECKPOINT = 30.0", "SECONDS_PER_CHECKPOINT = 0.0")
-    assert often != jobs.read_text()
-    jobs.write_text(often)
-    return project
-
-
-def made(project: Project) -> dict[str, str]:
-    """Checksums of what a study computes: all its files but those that tell times."""
-    results = project.folder / "results"
-    files = [path for path in results.rglob("*") if path.is_file() and path.suffix in {".pt", ".parquet", ".csv"}]
-    return {str(path.relative_to(results)): sha256(path) for path in files if "/." not in str(path)}
 
 
 def reproduce(project: Project) -> subprocess.CompletedProcess:
@@ -78,27 +53,19 @@ def checkpoints(project: Project) -> list[Path]:
     return list((project.folder / "results/.checkpoints").glob("*/checkpoint.pt"))
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory) -> dict[str, str]:
-    project = new_project(tmp_path_factory.mktemp("undisturbed"))
-    project.run("--", TARGET)
-    found = made(project)
-    assert len(found) == 2 * 4 + 3
-    return found
-
-
 def test_one_core_gives_the_bytes_of_all(project, undisturbed):
     project.run("--cores", "1", "--", TARGET)
-    assert made(project) == undisturbed
+    assert computed(project.folder) == undisturbed
 
 
 @pytest.fixture
-def project(tmp_path) -> Project:
-    return new_project(tmp_path)
+def project(longer, tmp_path) -> Project:
+    """A study of two blocks that keep a checkpoint after every iteration."""
+    return longer(tmp_path)
 
 
 def assert_whole(project, undisturbed):
-    assert made(project) == undisturbed
+    assert computed(project.folder) == undisturbed
     assert list((project.folder / "results/.checkpoints").iterdir()) == [], "a finished block leaves no checkpoint"
 
 
@@ -231,10 +198,8 @@ def test_damaged_file_is_named_when_it_is_read(finished, tmp_path, name, reader,
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory) -> Project:
-    project = new_project(tmp_path_factory.mktemp("finished"))
-    project.run("--", TARGET)
-    return project
+def finished(longer_study, tmp_path_factory) -> Project:
+    return longer_study.copied(tmp_path_factory.mktemp("finished") / "study")
 
 
 def test_full_disk_loses_no_finished_block(project, undisturbed):
@@ -246,14 +211,14 @@ def test_full_disk_loses_no_finished_block(project, undisturbed):
         pytest.skip("mounting a small disk takes root")
     try:
         project.run("--", f"{CELL}/seeds0-0/manifest.json")
-        block = made(project)
+        block = computed(project.folder)
         with contextlib.suppress(OSError), (results / "filler").open("wb", buffering=0) as filler:
             while True:
                 filler.write(bytes(4096))
         done = project.snakemake("--", TARGET)
         assert done.returncode != 0
         assert "No space left on device" in done.stderr
-        assert {name: checksum for name, checksum in made(project).items() if "seeds0-0" in name} == block
+        assert {name: checksum for name, checksum in computed(project.folder).items() if "seeds0-0" in name} == block
         (results / "filler").unlink()
         done = reproduce(project)
         assert done.returncode == 0, done.stderr[-3000:]

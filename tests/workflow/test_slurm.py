@@ -14,18 +14,10 @@ import time
 from pathlib import Path
 
 import pytest
-from project import Project
-
-from reacher_shaping.storage.files import sha256
+from project import Project, computed
 
 TARGET = "results/runs.parquet"
-CELL = "results/paper/l2/61440/alpha1"
-STUDY = {
-    "seeds": 2,
-    "seeds_per_block": 1,
-    "evaluation": {"episodes": 20, "radius": 0.02},
-    "grid": [{"variants": ["l2"], "budgets": [61440]}],
-}
+BLOCK = "paper/l2/61440/alpha1/seeds0-0"
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "squeue", "scancel")
 CONFIG = """
 ClusterName=test
@@ -117,66 +109,94 @@ def wait_for(happened, seconds=300.0):
     raise AssertionError("it did not happen")
 
 
-def new_project(folder: Path) -> Project:
+@pytest.fixture
+def project(longer, tmp_path) -> Project:
     """A study of two blocks that keep a checkpoint after every iteration, and a queue that is asked often."""
-    project = Project(folder, STUDY)
-    for name, old, new in (
-        ("src/reacher_shaping/jobs/training_job.py", "SECONDS_PER_CHECKPOINT = 30.0", "SECONDS_PER_CHECKPOINT = 0.0"),
-        ("profiles/slurm/config.yaml", "status-checks: 10", "status-checks: 2"),
-        ("profiles/slurm/config.yaml", "latency-wait: 60", "latency-wait: 5"),
-    ):
-        text = (folder / name).read_text()
+    profile = tmp_path / "profiles/slurm/config.yaml"
+    project = longer(tmp_path)
+    for old, new in (("status-checks: 10", "status-checks: 2"), ("latency-wait: 60", "latency-wait: 5")):
+        text = profile.read_text()
         assert old in text
-        (folder / name).write_text(text.replace(old, new))
+        profile.write_text(text.replace(old, new))
     return project
 
 
-@pytest.fixture
-def project(tmp_path) -> Project:
-    return new_project(tmp_path)
+def start(project: Project, *arguments: str, target: str = f"results/{BLOCK}/manifest.json") -> subprocess.Popen:
+    """Start Snakemake on SLURM, for one block alone."""
+    return project.start("-m", "snakemake", "--workflow-profile", "slurm", *arguments, "--", target)
 
 
-@pytest.fixture(scope="module")
-def local(tmp_path_factory) -> dict[str, str]:
-    project = new_project(tmp_path_factory.mktemp("local"))
-    project.run("--", TARGET)
-    return made(project)
+def assert_done(running: subprocess.Popen) -> None:
+    _, said = running.communicate(timeout=900)
+    assert running.returncode == 0, said[-3000:]
 
 
-def made(project: Project) -> dict[str, str]:
-    """Checksums of what a study computes, less what tells times."""
-    results = project.folder / "results"
-    files = [path for path in results.rglob("*") if path.is_file() and path.suffix in {".pt", ".parquet", ".csv"}]
-    return {str(path.relative_to(results)): sha256(path) for path in files if "/." not in str(path)}
+def log(project: Project) -> str:
+    """What the block's training told."""
+    return (project.folder / "results/logs" / BLOCK / "train.log").read_text()
 
 
-def on_slurm(project: Project, *arguments: str) -> subprocess.CompletedProcess:
-    return project.snakemake("--workflow-profile", "slurm", *arguments, "--", TARGET)
+def of_block(checksums: dict[str, str]) -> dict[str, str]:
+    return {name: checksum for name, checksum in checksums.items() if name.startswith(BLOCK)}
 
 
-def log_of(project: Project, block: str) -> str:
-    path = project.folder / "results/logs/paper/l2/61440/alpha1" / block / "train.log"
-    return path.read_text() if path.exists() else ""
-
-
-def training_jobs(state: str = "R") -> list[str]:
+def jobs(state: str) -> list[str]:
+    """Jobs in the queue, by SLURM's letters for their state."""
     return run("squeue", "-h", "-t", state, "-o", "%A").split()
 
 
-def test_study_on_slurm_has_the_bytes_of_a_local_one(slurm, project, local):
-    done = on_slurm(project)
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert made(project) == local
+def checkpoints(project: Project) -> list[Path]:
+    return list(project.folder.glob("results/.checkpoints/*/checkpoint.pt"))
+
+
+def test_study_on_slurm_has_the_bytes_of_a_local_one(slurm, project, undisturbed):
+    assert_done(start(project, target=TARGET))
+    assert computed(project.folder) == undisturbed
     assert list((project.folder / "results/.checkpoints").iterdir()) == []
     [log] = (project.folder / ".snakemake/log").glob("*.log")
     assert log.read_text().count("has been submitted with SLURM jobid") == 2, "a job a block, and none for the tables"
 
 
-def test_cancelled_job_goes_on_from_its_checkpoint(slurm, project, local):
-    running = project.start("-m", "snakemake", "--workflow-profile", "slurm", "--jobs", "1", "--", TARGET)
-    wait_for(lambda: list(project.folder.glob("results/.checkpoints/*/checkpoint.pt")))
-    run("scancel", *training_jobs())
-    _, said = running.communicate(timeout=900)
-    assert running.returncode == 0, said[-3000:]
-    assert made(project) == local
-    assert any(log_of(project, f"seeds{seed}-{seed}").startswith("goes on from iteration") for seed in (0, 1))
+def test_cancelled_job_goes_on_from_its_checkpoint(slurm, project, undisturbed):
+    running = start(project)
+    wait_for(lambda: checkpoints(project))
+    run("scancel", *jobs("R"))
+    assert_done(running)
+    assert computed(project.folder) == of_block(undisturbed)
+    assert log(project).startswith("goes on from iteration")
+
+
+def test_job_of_a_killed_head_is_waited_for_and_its_block_taken_over(slurm, project, undisturbed):
+    running = start(project)
+    wait_for(lambda: checkpoints(project))
+    running.kill()
+    running.communicate()
+    assert jobs("R"), "the job outlives it"
+    unlocked = project.python("workflow/unlock.py", ".")
+    assert "Waiting for the jobs" in unlocked.stdout, unlocked.stdout + unlocked.stderr
+    assert_done(start(project))
+    assert computed(project.folder) == of_block(undisturbed)
+    assert log(project) == "takes over the training that a job before has finished\n"
+
+
+def test_job_over_its_time_gets_more_and_goes_on(slurm, project, undisturbed):
+    """SLURM counts whole minutes, so the training is slowed down to take longer than one."""
+    state = "            state = current\n"
+    with project.edited("src/reacher_shaping/jobs/training_job.py", state, state + "            time.sleep(3)\n"):
+        assert_done(start(project, "--set-resources", "train_block:runtime=attempt", "evaluate_block:runtime=0"))
+    assert computed(project.folder) == of_block(undisturbed)
+    assert log(project).startswith("goes on from iteration")
+
+
+def test_full_queue_is_waited_for(slurm, project, undisturbed):
+    """Another's job has all cores of the cluster."""
+    run("sbatch", "--cpus-per-task=2", "--output=/dev/null", "--wrap", "sleep 900")
+    try:
+        running = start(project)
+        wait_for(lambda: jobs("PD"))
+        assert running.poll() is None
+        assert checkpoints(project) == []
+    finally:
+        run("scancel", *jobs("R"))
+    assert_done(running)
+    assert computed(project.folder) == of_block(undisturbed)

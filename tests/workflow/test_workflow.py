@@ -1,5 +1,6 @@
 """The real Snakefile on a copy of the project: one study of toy size is run, then edits are judged by dry runs."""
 
+import json
 import zipfile
 
 import pandas as pd
@@ -230,6 +231,16 @@ def test_changed_crate_is_named_and_nothing_is_archived_by_it(project, tmp_path)
                 assert said.startswith("ro-crate-metadata.json: has changed since it was written; delete it and run")
     finally:
         path.write_text(content)
+
+
+def test_snakemakes_own_report_shows_figures_tables_and_the_report(project, tmp_path):
+    project.run("--report", str(tmp_path / "snakemake.html"))
+    page = (tmp_path / "snakemake.html").read_text()
+    shown = json.loads(page.split("var categories = ")[1].split(";\n")[0])
+    listed = {category: parts["Other"] for category, parts in shown.items()}
+    assert listed["Report"] == ["report/report.html"]
+    assert {"figures/figure_1.svg", "figures/profiles.svg"} <= set(listed["Figures"])
+    assert "results/tables/table_2.csv" in listed["Tables"]
 
 
 def test_finished_study_has_nothing_to_do(project):

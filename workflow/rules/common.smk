@@ -84,14 +84,14 @@ WORDS = source("src/reacher_shaping/report/text.yaml")
 
 
 def tables_made(rule, experiment=None):
-    """The tables that a rule makes, by name: its output."""
+    """The tables that a rule makes by their names, its output."""
     if experiment:
         return made_by(rule, EXPERIMENT_TABLES, f"results/experiments/{experiment}")
     return made_by(rule, STUDY_TABLES, "results")
 
 
 def tables_read(rule):
-    """The study-wide tables that a rule reads, by name: its input."""
+    """The study-wide tables that a rule reads by their names, its input."""
     return read_by(rule, STUDY_TABLES, "results")
 
 

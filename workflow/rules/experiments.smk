@@ -217,7 +217,8 @@ rule plot_experiment:
         lambda wildcards: tables_of(wildcards.experiment),
         training_logs=source("report/published/training_logs.csv"),
     output:
-        expand("figures/{{experiment}}_{{view}}.{kind}", kind=KINDS),
+        report("figures/{experiment}_{view}.svg", category="Further studies", subcategory="{experiment}"),
+        expand("figures/{{experiment}}_{{view}}.{kind}", kind=[kind for kind in KINDS if kind != "svg"]),
     log:
         "results/logs/experiments/{experiment}/plot_{view}.log",
     benchmark:

@@ -23,7 +23,7 @@ rule plot_figures:
         **tables_read("plot_figures"),
         peers=PEERS,
     output:
-        FIGURES,
+        [report(path, category="Figures") if path.endswith(".svg") else path for path in FIGURES],
     log:
         "results/logs/plot_figures.log",
     benchmark:
@@ -46,7 +46,7 @@ rule format_tables:
         **tables_read("format_tables"),
         words=WORDS,
     output:
-        FORMATTED_TABLES,
+        [report(path, category="Tables") if path.endswith(".csv") else path for path in FORMATTED_TABLES],
     log:
         "results/logs/format_tables.log",
     benchmark:

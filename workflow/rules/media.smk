@@ -5,14 +5,10 @@ CELL_NAMES = {cell.name: cell for cell in STUDY.cells}
 MEDIA = expand("results/media/{name}.{kind}", name=CELL_NAMES, kind=["gif", "mp4"])
 
 
-def first_block(name, file):
-    return f"results/{CELL_NAMES[name].folder}/{next(iter(SEEDS))}/{file}"
-
-
 rule render_media:
     input:
-        policy=lambda wildcards: first_block(wildcards.name, "policy.pt"),
-        training=ancient(lambda wildcards: first_block(wildcards.name, "training.json")),
+        policy=lambda wildcards: first_block(CELL_NAMES[wildcards.name], "policy.pt"),
+        training=ancient(lambda wildcards: first_block(CELL_NAMES[wildcards.name], "training.json")),
     output:
         gif="results/media/{name}.gif",
         mp4="results/media/{name}.mp4",

@@ -25,7 +25,7 @@ rule build_report:
         arm=source("src/reacher_shaping/report/arm.js"),
         words=WORDS,
     output:
-        page="report/report.html",
+        page=report("report/report.html", category="Report"),
         paper="report/report.pdf",
     log:
         "results/logs/build_report.log",

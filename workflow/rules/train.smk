@@ -38,3 +38,17 @@ rule train_block:
         code=lambda wildcards: code("train_block", CELLS[wildcards.cell].chosen_code),
     script:
         "../scripts/train_block.py"
+
+
+# Every cell is a target of its name, `snakemake -- paper-l2-500000-alpha0.5`; `make cells` lists the names.
+for cell in CELLS.values():
+
+    rule:
+        name:
+            cell.name
+        input:
+            expand(
+                "{block}/{file}",
+                block=blocks([cell], seeds_of(cell)),
+                file=["policy.pt", "progress.parquet", "training.json", "episodes.parquet", "manifest.json"],
+            ),

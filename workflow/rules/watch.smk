@@ -30,12 +30,12 @@ def is_news(record):
     return record.levelno >= logging.WARNING and not told
 
 
-def expected_seconds(rule, wildcards, rates):
+def expected_seconds(name, wildcards, rates):
     """What a job takes on one core."""
     seeds = len(SEEDS.get(wildcards.get("block"), ()))
-    if rule == "train_block":
+    if name == "train_block":
         return cost.training_seconds(CELLS[wildcards["cell"]], seeds, rates)
-    if rule in ("evaluate_block", "evaluate_long"):
+    if name in ("evaluate_block", "evaluate_long"):
         return cost.evaluation_seconds(STUDY.evaluation, seeds, rates)
     return cost.SMALL_JOB_SECONDS
 

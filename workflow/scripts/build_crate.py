@@ -1,7 +1,9 @@
 """Write the study's settings, and the crate that lists all its files with their checksums."""
 
 import json
+import os
 from collections.abc import Iterable, Iterator
+from contextlib import chdir
 from pathlib import Path
 
 from job import logged
@@ -11,6 +13,7 @@ from reacher_shaping.storage.files import write_json
 from reacher_shaping.storage.provenance import changed_outputs, require_asked
 
 given, params, output = snakemake.input, snakemake.params, snakemake.output
+root = Path(output.crate).parent  # of the study's files, wherever they lie
 
 
 def files(paths: Iterable[str]) -> Iterator[Path]:
@@ -27,12 +30,14 @@ with logged(snakemake):
     if changed:
         raise ValueError(changed[0])
     write_json(output.settings, {"study": json.loads(params.study), "sha256": params.settings_hash})
-    settings = Path(output.settings)
-    found = crate.describe(
-        [*set(files(given.files)), settings],
-        settings=settings,
-        manifests=manifests,
-        name="Reward shaping for PPO on Reacher-v5",
-        description=f"A run of the reacher-shaping study with {params.cells} cells of {params.seeds} seeds.",
-    )
+    names = [os.path.relpath(path, root) for path in given.files]
+    settings = Path(os.path.relpath(output.settings, root))
+    with chdir(root):
+        found = crate.describe(
+            [*set(files(names)), settings],
+            settings=settings,
+            manifests=manifests,
+            name="Reward shaping for PPO on Reacher-v5",
+            description=f"A run of the reacher-shaping study with {params.cells} cells of {params.seeds} seeds.",
+        )
     write_json(output.crate, found)

@@ -13,6 +13,7 @@ from reacher_shaping.storage.provenance import differing, require_asked
 
 given, params = snakemake.input, snakemake.params
 manifests = [given.manifests] if isinstance(given.manifests, str) else given.manifests
+results = Path(given.runs).parent
 
 with logged(snakemake):
     records = [read_json(path) for path in manifests]
@@ -20,12 +21,12 @@ with logged(snakemake):
         asked = [*params.asked, *params.further_asked]
         for path, block in zip([*manifests, *given.further_manifests], asked, strict=True):
             require_asked(path, json.loads(block))
-    elif changed := differing(Path("results"), records[0].get("tables", {})):
+    elif changed := differing(results, records[0].get("tables", {})):
         raise ValueError(changed[0])
     # The reference run brings its own settings: config.yaml may ask for another study by now.
     now = json.loads(params.study)
     told = records[0] if "study" in records[0] else {"study": now, "settings_hash": params.settings_hash}
-    study = load("results", Path(given.table2).parent)
+    study = load(results, Path(given.table2).parent)
     if "study" not in records[0]:
         expected = {"seeds": params.seeds, "episodes": params.episodes}
         found = sanity.problems(study.tables["runs"], study.tables["cells"], params.cells, **expected, limits={})

@@ -5,13 +5,13 @@ What a job has made is sealed with its checksum; what it is made of must be as i
 
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from reacher_shaping.jobs import folder_lock
-from reacher_shaping.storage.files import check_seal, seal
+from reacher_shaping.storage.files import check_seal, seal, seal_of
 
 
 @contextmanager
@@ -35,11 +35,17 @@ def logged(job: Any) -> Iterator[Callable[[str], None]]:
             sys.exit(code)
 
         try:
-            for file in on_disk(job.input):
-                check_seal(file)
+            for file in filter(Path.is_file, map(Path, job.input)):
+                if is_copy(file):
+                    seal_of(file).unlink(missing_ok=True)  # of a copy that was here before
+                else:
+                    check_seal(file)
             yield say
-            for file in on_disk(job.output):
-                seal(file)
+            for file in filter(Path.is_file, map(Path, job.output)):
+                if is_copy(file):
+                    seal_of(file).unlink(missing_ok=True)
+                else:
+                    seal(file)
         except KeyboardInterrupt:
             end("stopped", 130)
         except Exception as error:
@@ -47,7 +53,6 @@ def logged(job: Any) -> Iterator[Callable[[str], None]]:
             end(f"{type(error).__name__}: {error} (log: {path})", 1)
 
 
-def on_disk(files: Iterable[str]) -> list[Path]:
-    """The files among these that lie in the study's folder: of an object storage this machine has but a copy."""
-    paths = map(Path, files)
-    return [path for path in paths if path.is_file() and path.parts[:2] != (".snakemake", "storage")]
+def is_copy(file: Path) -> bool:
+    """Whether this machine has a file but for a job, from an object storage, whose checksum would not go with it."""
+    return file.parts[:2] == (".snakemake", "storage")
