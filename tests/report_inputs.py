@@ -30,9 +30,50 @@ MANIFEST = {
 }
 
 
+KEY = ["protocol", "variant", "budget", "alpha0"]
+
+
+def curves(grid):
+    """Three iterations of every cell, of which one is shown: its return is minus its number in the grid."""
+    return pd.DataFrame(
+        [
+            dict(
+                zip(KEY, cell, strict=True),
+                iteration=at,
+                env_steps=2048 * at,
+                episode_return=-n,
+                low=-n - 1,
+                high=-n + 1,
+            )
+            for n, cell in enumerate(grid)
+            for at in (1, 2, 3)
+        ]
+    )
+
+
+def radii(grid):
+    """Success of every cell at three radii, the radius in units of 0.05 m; a tenth of it at the last step."""
+    made = [
+        dict(zip(KEY, cell, strict=True), mode="stochastic", radius=radius, success_rate=radius / 0.05)
+        for cell in grid
+        for radius in (0.01, 0.02, 0.03)
+    ]
+    frame = pd.DataFrame(made).assign(final_success_rate=lambda rows: rows["success_rate"] / 10)
+    for name in ("success_rate", "final_success_rate"):
+        frame[f"{name}_low"], frame[f"{name}_high"] = frame[name] - 0.05, frame[name] + 0.05
+    return frame
+
+
 def make(folder, study, grid, seeds, **changes):
     cells = synthetic.cells(grid, seeds)
-    sizes = {"figure_1": (2, 1), "figure_2": (1, 2), "lottery": (1, 1), "forest": (2, 2), "peers": (3, 1)}
+    sizes = {
+        "figure_1": (2, 1),
+        "figure_2": (1, 2),
+        "lottery": (1, 1),
+        "success_by_radius": (2, 1),
+        "forest": (2, 2),
+        "peers": (3, 1),
+    }
     figures = {name: Figure(figsize=size) for name, size in sizes.items()}
     paths = {name: save(figure, folder / "figures" / name, ("svg", "pdf"))[0] for name, figure in figures.items()}
     (folder / "media").mkdir()
@@ -48,6 +89,7 @@ def make(folder, study, grid, seeds, **changes):
         "comparisons": comparisons.comparison_frame(runs), "peers": synthetic.peers(),
         "winners": single_seed_studies.winners_frame(studies), "spread": single_seed_studies.spread_frame(studies),
         "claims": synthetic.claims(), "claim_parts": synthetic.claim_parts(), "scores": scores_frame(runs),
+        "curves": curves(grid), "radii": radii(grid),
     }  # fmt: skip
     kept = changes.pop("only", tables)
     tables = {name: table for name, table in tables.items() if name in kept}

@@ -46,6 +46,7 @@ PACKAGE = {
     "yaml": "pyyaml",
     "PIL": "pillow",
     "sbx": "sbx-rl",
+    "vl_convert": "vl-convert-python",
     "markupsafe": "jinja2",  # comes with it, as the next ones with theirs
     "IPython": "ipykernel",
     "glfw": "mujoco",

@@ -63,6 +63,7 @@ def visit(browser, address):
 def test_page_is_accessible_fits_its_width_and_asks_no_network(visit, size, scheme):
     page = visit(size, color_scheme=scheme)
     page.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true; })")
+    page.locator("#success_by_radius .chart svg").wait_for()
     broken = axe.Axe().run(page).response["violations"]
     assert not [(rule["id"], rule["nodes"][0]["html"]) for rule in broken]
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -124,6 +125,41 @@ def test_a_link_opens_its_claim_and_verdicts_filter(visit):
     page.locator("#verdicts").select_option("reproduced")
     assert page.locator("#C18").is_visible()
     assert not page.locator("#C3").is_visible()
+
+
+def opened_chart(page, figure):
+    chart = page.locator(f"#{figure} details.chart")
+    chart.locator("summary").click()
+    chart.locator("svg").wait_for()
+    return chart
+
+
+def test_curves_tell_their_values_and_are_switched_in_the_legend(visit):
+    page = visit(WIDE)
+    chart = opened_chart(page, "figure_1")
+    dots = chart.locator(".mark-symbol.role-mark path")
+    assert dots.count() == 6  # the variants of the first setting, one iteration of three
+    dots.last.hover(force=True)
+    assert "2,048" in page.locator("#vg-tooltip-element").text_content()
+    box = chart.locator(".role-legend-label text").first.bounding_box()
+    page.mouse.click(box["x"] + 5, box["y"] + 5)
+    page.wait_for_function("document.querySelectorAll('#figure_1 .mark-symbol.role-mark path').length === 1")
+
+
+def test_success_is_shown_at_the_radius_of_the_slider_and_the_step_asked_for(visit):
+    page = visit(PHONE)
+    chart = opened_chart(page, "success_by_radius")
+    dots = chart.locator(".mark-symbol.role-mark path")
+    assert dots.count() == len(synthetic.PAPER_GRID)
+    told = [dots.first.get_attribute("aria-label")]
+    chart.locator("input[type=range]").fill("30")
+    page.wait_for_timeout(300)
+    told.append(dots.first.get_attribute("aria-label"))
+    chart.locator("select").select_option(label="at the last step")
+    page.wait_for_timeout(300)
+    told.append(dots.first.get_attribute("aria-label"))
+    assert [float(re.search(r"success: ([\d.]+);", said)[1]) for said in told] == [0.4, 0.6, 0.06]
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
 def test_a_dragged_target_starts_an_episode_that_is_told(visit):

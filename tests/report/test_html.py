@@ -5,6 +5,7 @@ import dataclasses
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote
 
 import jinja2
 import numpy as np
@@ -92,8 +93,8 @@ def test_same_inputs_give_the_same_report(inputs):
 
 
 def test_figures_are_the_given_files(page, inputs):
-    encoded = [source.split(",")[1] for source in page.loaded if source.startswith("data:image/svg")]
-    assert [base64.b64decode(text) for text in encoded] == [path.read_bytes() for path in inputs.figures.values()]
+    encoded = [source.split(",", 1)[1] for source in page.loaded if source.startswith("data:image/svg")]
+    assert [unquote(text).encode() for text in encoded] == [path.read_bytes() for path in inputs.figures.values()]
     assert page.ids.index("seeds") < page.ids.index("lottery") < page.ids.index("further") < page.ids.index("forest")
     assert page.ids.index("short") < page.ids.index("claims") < page.ids.index("seeds")
     assert page.ids.index("forest") < page.ids.index("peers")

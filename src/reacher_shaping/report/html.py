@@ -14,6 +14,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from reacher_shaping.analysis.baselines import ALGORITHMS, by_algorithm, peer_table
+from reacher_shaping.figures import interactive
 from reacher_shaping.labels import budget_label, of_protocol
 from reacher_shaping.report import (
     arm,
@@ -91,6 +92,11 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     further = [picture for name, picture in drawn.items() if not name.startswith(own) and name not in OWN_SECTION]
     facts = computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol)
     first = summary(study, inputs.protocol)
+    charts = {
+        name: Markup(chart)
+        for name, chart in interactive.charts(study.tables, inputs.protocol).items()
+        if name in drawn
+    }
     played = arm.arm(inputs.policies)
     absent = {"further": not further, "rollouts": not videos, "arm": not played}
     sections = [name for name in entry("page.sections") if not absent.get(name, False)]
@@ -116,6 +122,8 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         "departures": departures_grid(inputs.settings),
         "grid": study_grid(cells),
         "pictures": drawn,
+        "charts": charts,
+        "charts_code": Markup(interactive.code()) if charts else "",
         "further": further,
         "experiments": [
             study_sections.section(

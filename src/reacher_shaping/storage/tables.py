@@ -80,7 +80,7 @@ STUDY_TABLES = {
         "aggregate_runs",
         ("check_results", "format_tables", "plot_figures", *REPORT),
     ),
-    "curves": Entry(*_AGGREGATED["curves"], "aggregate_runs", ("plot_figures",)),
+    "curves": Entry(*_AGGREGATED["curves"], "aggregate_runs", ("plot_figures", *REPORT)),
     "correlation": Entry(
         "correlation.csv",
         schemas.CORRELATION,
