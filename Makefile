@@ -68,6 +68,7 @@ else
 	@mkdir -p build/reference/results
 	@rm -rf build/reference/results/peers.parquet build/reference/results/experiments
 	@cp -rp report/reference/* build/reference/results/
+	@test -d build/reference/results/experiments/sparse || cp -rp report/sparse_run build/reference/results/experiments/sparse
 	@python workflow/unlock.py build/reference
 	$(SNAKEMAKE) --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report -- report/reference.html
 	@echo "The report of the reference run: $(CURDIR)/build/reference/report/reference.html"

@@ -9,10 +9,13 @@ import pandas as pd
 import pytest
 import yaml
 
-from reacher_shaping.analysis.hypotheses import permutation_p, take_off_frame, take_off_steps, verdicts
+from reacher_shaping.analysis.hypotheses import permutation_p, take_off_curves, take_off_frame, take_off_steps, verdicts
 from reacher_shaping.labels import KEY
+from reacher_shaping.settings.outputs import files_of
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.stats import holm
+from reacher_shaping.storage import schemas
+from reacher_shaping.storage.files import read_table
 
 ROOT = Path(__file__).parents[2]
 LEDGERS = yaml.safe_load((ROOT / "report/hypotheses.yaml").read_text())
@@ -60,6 +63,7 @@ def test_runs_that_are_apart_support_or_contradict_by_the_sign_predicted():
     assert row["verdict"] == "supported"
     assert row["p"] == pytest.approx(2 / math.comb(12, 6))
     assert (row["solved_a"], row["solved_b"]) == (1, 0)
+    assert (row["least_a"], row["greatest_a"], row["least_b"], row["greatest_b"]) == (0.5, 0.6, 0.0, 0.03)
     assert (row["taken_off_a"], row["taken_off_b"], row["take_off_a"]) == (1, 0, 100)
     assert row["difference"] == pytest.approx(np.mean(HIGH) - np.mean(LOW))
     assert row["ci_low"] < row["difference"] < row["ci_high"]
@@ -120,3 +124,31 @@ def test_p_is_corrected_over_the_family():
     table = verdicts(runs, take_off, ledger)
     np.testing.assert_allclose(table["p_holm"], holm(table["p"]))
     assert table["verdict"].tolist() == ["supported", "open"]
+
+
+def test_take_off_curves_are_means_over_windows_that_do_not_overlap():
+    key = {"protocol": "p", "variant": "l2", "budget": 500, "alpha0": 50.0}
+    success = np.arange(12) / 20
+    progress = pd.DataFrame({"iteration": range(1, 13), "env_steps": range(100, 1300, 100), "success_rate": success})
+    table = take_off_curves(
+        pd.concat([progress.assign(seed=seed, **key) for seed in (0, 1)]).sample(frac=1, random_state=1)
+    )
+    assert list(table["seed"]) == [0, 0, 1, 1]
+    assert list(table["iteration"]) == [5, 10, 5, 10]
+    assert list(table["env_steps"]) == [500, 1000, 500, 1000]
+    np.testing.assert_allclose(table["success_rate"][:2], [0.1, 0.35])
+
+
+def test_the_kept_sparse_run_is_complete_and_its_verdicts_are_those_of_its_runs():
+    folder = ROOT / "report/sparse_run"
+    study = load_study(read_settings(ROOT / "config.yaml"))
+    assert {path.name for path in folder.iterdir()} == {*files_of(study, "sparse", {"sparse"}), "README.md"}
+    runs = read_table(folder / "runs.parquet", schemas.RUNS)
+    kept = read_table(folder / "hypotheses.csv", schemas.HYPOTHESES)
+    (ledger,) = (ledger for ledger in LEDGERS if ledger["study"] == "sparse")
+    unknown = runs[[*KEY, "seed"]].assign(take_off=np.nan)
+    first = ledger | {"hypotheses": ledger["hypotheses"][:2]}
+    again = verdicts(runs, unknown, first)
+    shown = ["id", "claim", "difference", "ci_low", "ci_high", "p", "solved_a", "least_a", "greatest_b"]
+    pd.testing.assert_frame_equal(again[shown], kept[shown].head(2), check_dtype=False)
+    assert set(kept["verdict"]) == {"open"}

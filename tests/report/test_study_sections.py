@@ -1,5 +1,7 @@
 """The further studies' figures and their section of the report show the numbers of their tables."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +11,9 @@ from switched import LOGS, peers
 
 from reacher_shaping.analysis.baselines import agreement_frame
 from reacher_shaping.report import paper_tables, study_sections, study_tables
+from reacher_shaping.storage.reference import read_studies
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -173,12 +178,32 @@ def test_unknown_experiment_has_a_section_too(released):
 def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
     row = {"id": "S1", "claim": "c", "a": "p l2 50", "b": "p none 1", "mean_a": 0.5, "mean_b": 0.01, "difference": 0.49}
     row |= {"ci_low": 0.3, "ci_high": 0.6, "p_holm": 0.009, "solved_a": 0.8, "solved_b": 0.0, "verdict": "supported"}
+    row |= {"runs": 10.0, "least_a": 0.02, "greatest_a": 0.6}
     table = pd.DataFrame([row, row | {"id": "S2", "verdict": "open"}])
     grid = study_tables.hypotheses(table)
     assert len(grid.headings) == len(grid.rows[0])
     assert grid.rows[0][2:4] == ["p l2 50: 0.500", "p none 1: 0.010"]
     assert [row[-1] for row in grid.rows] == ["supported", "open"]
-    assert "Of 2 hypotheses" in study_sections.hypotheses_sentence(table)
+    counted, opened, told = study_sections.hypotheses_sentences(table)
+    assert counted == ("Of 2 hypotheses written down before the runs, 1 are supported, 0 contradicted and 1 stay open.")
+    assert "none is excluded" in opened
+    assert "“c”, is supported" in told
+    assert "differs by 49.0 [30.0, 60.0] points (p 0.009 " in told
+    assert "8 of 10 runs solve the task with p l2 50, 0 with p none 1." in told
+    assert "between 2.0 and 60.0 %" in told
+    decided = study_sections.hypotheses_sentences(table.assign(verdict="supported"))
+    assert not [text for text in decided if "none is excluded" in text]
+
+
+def test_a_study_with_hypotheses_tells_them_and_their_table_first():
+    folder = ROOT / "report/sparse_run"
+    given = read_studies([str(path) for path in folder.iterdir() if path.suffix in (".csv", ".parquet")])["sparse_run"]
+    section = study_sections.section("sparse", given, LOGS)
+    assert section.sentences[0].startswith("Of 9 hypotheses written down before the runs, 0 are supported, 0 contra")
+    (grid,) = section.first.values()
+    assert [row[0] for row in grid.rows] == [f"S{number}" for number in range(1, 10)]
+    assert {row[-1] for row in grid.rows} == {"open"}
+    assert section.figures == [f"sparse_{view}" for view in ("cells", "dose", "takeoff", "targets", "log", "forest")]
 
 
 def test_lengths_have_a_row_per_cell_and_length_with_every_interval():

@@ -22,13 +22,15 @@ def keys(*cells):
     ],
 )
 def test_views_follow_from_the_cells(cells, switches, expected):
-    assert views(cells, switches=switches) == expected
+    assert views(cells, {"effects"} if switches else {}) == expected
 
 
 def test_the_studies_of_the_configuration_have_theirs():
     study = load_study(read_settings("config.yaml"))
     found = {
-        name: views([cell.key for cell in cells], switches=study.experiments[name].switches is not None)
+        name: views(
+            [cell.key for cell in cells], {file.partition(".")[0] for file in files_of(study, name, {"sparse"})}
+        )
         for name, cells in study.experiment_cells.items()
     }
     expected = {
@@ -36,7 +38,7 @@ def test_the_studies_of_the_configuration_have_theirs():
         "attribution": ["cells", "effects"],
         "standard": ["cells", "log", "forest"],
         "tuned": ["cells", "log"],
-        "sparse": ["cells", "dose", "log", "forest"],
+        "sparse": ["cells", "dose", "takeoff", "targets", "log", "forest"],
         "weights": ["cells", "log", "forest"],
         "tasks": ["cells", "log", "forest"],
         "long": ["cells", "log"],
@@ -52,7 +54,8 @@ def test_a_study_has_the_tables_that_it_asks_for():
     def having(file):
         return {name for name, own in files.items() if file in own}
 
-    assert having("hypotheses.csv") == {"sparse"}
+    assert having("hypotheses.csv") == having("takeoff.parquet") == having("targets.parquet") == {"sparse"}
+    assert "targets.parquet" not in files_of(study, "tasks", {"tasks"}), "no targets in Reacher's plane"
     assert having("lengths.parquet") == {"long"}
     assert having("effects.csv") == {"attribution", "ablation"}
     assert having("agreement.csv") == {"standard"}

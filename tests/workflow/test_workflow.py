@@ -5,21 +5,26 @@ import zipfile
 
 import pandas as pd
 import pytest
-from project import Project
+from project import ROOT, Project
 from rocrate.rocrate import ROCrate
 
 from reacher_shaping import processor
+from reacher_shaping.settings.study import read_settings
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_json, read_table, sha256
 
 FURTHER = {
-    "seeds": 1,
+    "seeds": 2,
     "switches": {
         "start": "standard", "end": "paper", "settings": {"ends": ["shaping.episode_end"]},
         "variants": ["none"], "budget": 2048,
     },
-    "peers": {"seeds": 1, "budgets": {"ppo": 2048}},
+    "peers": {"seeds": 1, "budgets": {"ppo": 2048}}, "lengths": True,
 }  # fmt: skip
+LEDGER = """
+- {study: mine, measure: final_success_rate, error: 0.05, hypotheses: [
+  {id: M1, claim: Ends differ., predicts: positive, a: [standard, none, 1], b: [paper, none, 1]}]}
+"""
 NONE, DECAY = "results/paper/none/2048/alpha1", "results/paper/decay200k_l2sq/2048/alpha0.5"
 EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "check_results", "plot_figures"}
 
@@ -95,6 +100,13 @@ def test_unknown_variant_ends_a_dry_run_with_one_line(empty):
         said = refusal(empty)
     assert said.startswith("ConfigError: config: grid.0.variants = 'l3' is unknown; allowed: none, l2, l2sq")
     assert "\n" not in said
+
+
+def test_every_further_study_of_the_configuration_can_be_planned(empty):
+    settings = read_settings(ROOT / "config.yaml")
+    with empty.configured(experiments=settings["experiments"]):
+        planned = empty.planned("--", *settings["experiments"])
+    assert planned.keys() >= {"judge_hypotheses", "map_targets", "summarise_lengths", "measure_effects"}
 
 
 def test_empty_configuration_ends_a_dry_run_with_one_line(empty):
@@ -337,10 +349,10 @@ def test_block_made_again_has_the_same_bytes_and_reruns_nothing_else(project):
 
 def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp_path):
     copy = project.copied(tmp_path / "copy")
-    with copy.configured(experiments={"mine": FURTHER}):
+    with copy.configured(experiments={"mine": FURTHER}), copy.replaced("report/hypotheses.yaml", LEDGER):
         assert "aggregate_experiment" not in copy.planned()  # a plain call is the main study alone
         shared = copy.planned("mine")["train_block"]
-        assert not [path for path in shared if path.startswith(f"{NONE}/seeds0-0/")]  # trained for the main study
+        assert not [path for path in shared if path.startswith(f"{NONE}/")]  # trained for the main study
         copy.run("mine")
         folder = copy.folder / "results/experiments/mine"
         effects = read_table(folder / "effects.csv", schemas.EFFECTS)
@@ -348,8 +360,16 @@ def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp
         assert len(read_table(folder / "agreement.csv", schemas.AGREEMENT)) == 8
         runs = read_table(folder / "runs.parquet", schemas.RUNS)
         assert set(runs["protocol"]) == {"standard", "paper", "standard_with_ends", "paper_without_ends"}
+        judged = read_table(folder / "hypotheses.csv", schemas.HYPOTHESES)
+        assert judged[["id", "a", "runs"]].to_numpy().tolist() == [["M1", "standard none 1", 2]]
+        assert read_table(folder / "takeoff.parquet", schemas.TAKEOFF).columns.size == 8
+        targets = read_table(folder / "targets.parquet", schemas.TARGETS)
+        assert targets.groupby("protocol")["episodes"].sum().eq(2 * runs["episodes"].iloc[0]).all()
+        assert set(read_table(folder / "lengths.parquet", schemas.LENGTHS)["protocol"]) == set(runs["protocol"])
         assert copy.planned("mine") == {}
         copy.run("--allowed-rules", "build_report", "--", "report/report.html")
         page = (copy.folder / "report/report.html").read_text()
         assert '<h3 id="mine">Mine</h3>' in page
         assert 'id="mine_effects"' in page
+        assert "Of 1 hypotheses written down before the runs" in page
+        assert 'id="mine_targets"' in page

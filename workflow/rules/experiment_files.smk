@@ -3,6 +3,8 @@ import yaml
 
 from reacher_shaping.settings.outputs import VIEWS, files_of, judged, views
 
+HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())}
+
 
 def of_experiment(make):
     """A param or input made of the cells and seeds of the experiment named by the wildcard."""
@@ -33,17 +35,18 @@ def twins(cells):
     return found
 
 
+def tables_named(experiment):
+    """Names of an experiment's tables."""
+    return {Path(file).stem for file in files_of(STUDY, experiment, HYPOTHESES)}
+
+
 def views_of(experiment):
     """Names of an experiment's figures."""
-    keys = [cell.key for cell in EXPERIMENTS[experiment]]
-    return views(keys, switches=STUDY.experiments[experiment].switches is not None)
+    return views([cell.key for cell in EXPERIMENTS[experiment]], tables_named(experiment))
 
 
 def figures_of(experiment):
     return expand("figures/{experiment}_{view}.{kind}", experiment=experiment, view=views_of(experiment), kind=KINDS)
-
-
-HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())}
 
 
 def tables_of(experiment):

@@ -160,8 +160,11 @@ rule summarise_lengths:
     wildcard_constraints:
         experiment=one_of(name for name, study in STUDY.experiments.items() if study.lengths),
     threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
-        cells=of_experiment(block_cells),
+        cells=lambda wildcards: block_cells(wildcards.experiment),
         asked=of_experiment(asked_of_blocks),
         code=code("summarise_lengths"),
     script:
@@ -181,12 +184,40 @@ rule judge_hypotheses:
     wildcard_constraints:
         experiment=one_of(HYPOTHESES),
     threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         ledger=lambda wildcards: as_json(HYPOTHESES[wildcards.experiment] | {"dated": None}),
-        cells=of_experiment(block_cells),
+        cells=lambda wildcards: block_cells(wildcards.experiment),
         code=code("judge_hypotheses"),
     script:
         "../scripts/judge_hypotheses.py"
+
+
+rule map_targets:
+    input:
+        episodes=of_blocks("episodes.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
+    output:
+        **tables_made("map_targets", "{experiment}"),
+    log:
+        "results/logs/experiments/{experiment}/map_targets.log",
+    benchmark:
+        "results/benchmarks/experiments/{experiment}/map_targets.tsv"
+    wildcard_constraints:
+        experiment=one_of(name for name in EXPERIMENTS if "targets" in tables_named(name)),
+    threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
+    params:
+        cells=lambda wildcards: block_cells(wildcards.experiment),
+        asked=of_experiment(asked_of_blocks),
+        root_seed=of_experiment(lambda cells, seeds: cells[0].root_seed),
+        code=code("map_targets"),
+    script:
+        "../scripts/map_targets.py"
 
 
 rule compare_with_peers:

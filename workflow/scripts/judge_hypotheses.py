@@ -16,6 +16,8 @@ with logged(snakemake):
     runs = read_table(given.runs, schemas.RUNS)
     blocks = zip(params.cells, given.progress, strict=True)
     parts = [read_table(unchanged(path), block_schemas.PROGRESS).assign(**cell) for cell, path in blocks]
-    take_off = hypotheses.take_off_frame(pd.concat(parts, ignore_index=True))
+    progress = pd.concat(parts, ignore_index=True)
+    take_off = hypotheses.take_off_frame(progress)
     judged = hypotheses.verdicts(runs, take_off, json.loads(params.ledger))
     write_table(snakemake.output.hypotheses, judged, schemas.HYPOTHESES)
+    write_table(snakemake.output.takeoff, hypotheses.take_off_curves(progress), schemas.TAKEOFF)

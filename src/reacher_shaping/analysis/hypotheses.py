@@ -25,11 +25,11 @@ def verdicts(runs: pd.DataFrame, take_off: pd.DataFrame, ledger: Mapping[str, An
         take_off: a row per run, the key, `seed` and `take_off`, see `take_off_steps`.
         ledger: the study's entry of report/hypotheses.yaml.
 
-    Columns: `id, claim, a, b` (the cells' names), `runs` of each, `mean_a, mean_b` of the primary measure, their
-    `difference` with Welch's 95 % limits `ci_low, ci_high`, the exact permutation test's `p` and Holm's `p_holm` over
-    the family, `predicts`, `solved_a, solved_b` and `taken_off_a, taken_off_b` (shares of runs), `take_off_a,
-    take_off_b` (median environment steps of those that took off), and `verdict`. Raises ValueError for a cell without
-    runs.
+    Columns: `id, claim, a, b` (the cells' names), `runs` of each, `mean_a, mean_b` of the primary measure and its ends
+    over runs `least_a, greatest_a, least_b, greatest_b`, the means' `difference` with Welch's 95 % limits `ci_low,
+    ci_high`, the exact permutation test's `p` and Holm's `p_holm` over the family, `predicts`, `solved_a, solved_b` and
+    `taken_off_a, taken_off_b` (shares of runs), `take_off_a, take_off_b` (median environment steps of those that took
+    off), and `verdict`. Raises ValueError for a cell without runs.
     """
     measure = ledger["measure"]
     together = runs.merge(take_off, on=[*KEY, "seed"], how="left", validate="one_to_one")
@@ -55,6 +55,8 @@ def verdicts(runs: pd.DataFrame, take_off: pd.DataFrame, ledger: Mapping[str, An
             row |= {
                 side: _name(hypothesis[side]),
                 f"mean_{side}": own[measure].mean(),
+                f"least_{side}": own[measure].min(),
+                f"greatest_{side}": own[measure].max(),
                 f"solved_{side}": (own[measure] >= SOLVED).mean(),
                 f"taken_off_{side}": len(started) / len(own),
                 f"take_off_{side}": started.median(),
@@ -77,10 +79,14 @@ def permutation_p(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(found.pvalue)
 
 
+def _averaged(success: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return success in training [I] averaged over each window of iterations [I - window + 1]."""
+    return np.convolve(success, np.full(TAKE_OFF_WINDOW, 1 / TAKE_OFF_WINDOW), "valid")
+
+
 def take_off_steps(success: NDArray[np.float64], env_steps: NDArray[np.int64]) -> float:
     """Return the environment steps [I] after which a run's success in training [I] has taken off; NaN for never."""
-    averaged = np.convolve(success, np.full(TAKE_OFF_WINDOW, 1 / TAKE_OFF_WINDOW), "valid")
-    reached = np.flatnonzero(averaged >= TAKEN_OFF)
+    reached = np.flatnonzero(_averaged(success) >= TAKEN_OFF)
     return float(env_steps[reached[0] + TAKE_OFF_WINDOW - 1]) if len(reached) else float("nan")
 
 
@@ -91,6 +97,19 @@ def take_off_frame(progress: pd.DataFrame) -> pd.DataFrame:
         steps = take_off_steps(own["success_rate"].to_numpy(), own["env_steps"].to_numpy())
         rows.append(dict(zip([*KEY, "seed"], key, strict=True)) | {"take_off": steps})
     return pd.DataFrame(rows)
+
+
+def take_off_curves(progress: pd.DataFrame) -> pd.DataFrame:
+    """Success in training as `take_off_steps` looks at it: a row per run and window of iterations, none overlapping.
+
+    `progress` are all progress tables with the cells' keys. Columns: the key, `seed, iteration, env_steps` of the
+    window's last iteration, and `success_rate`, the mean over the window.
+    """
+    parts = []
+    for _, own in progress.sort_values("iteration").groupby([*KEY, "seed"]):
+        curve = _averaged(own["success_rate"].to_numpy())[::TAKE_OFF_WINDOW]
+        parts.append(own.iloc[TAKE_OFF_WINDOW - 1 :: TAKE_OFF_WINDOW].assign(success_rate=curve))
+    return pd.concat(parts, ignore_index=True)[[*KEY, "seed", "iteration", "env_steps", "success_rate"]]
 
 
 def _of_cell(runs: pd.DataFrame, cell: Sequence[Any]) -> pd.DataFrame:

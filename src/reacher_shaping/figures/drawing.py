@@ -7,10 +7,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from reacher_shaping.figures import paper, robustness, studies
+from reacher_shaping.figures import hypotheses, paper, robustness, studies
 
 MAIN = (paper, robustness)
-STUDY = (studies,)
+STUDY = (studies, hypotheses)
 
 
 def function_of(name: str, modules: tuple[ModuleType, ...] = MAIN) -> Callable[..., Figure]:

@@ -2,8 +2,10 @@
 
 import pandas as pd
 
+from reacher_shaping.analysis.hypotheses import TAKE_OFF_WINDOW
 from reacher_shaping.analysis.learning_curves import BURN_IN, WINDOW
 from reacher_shaping.analysis.runs import LEARNED
+from reacher_shaping.analysis.target_maps import SQUARE
 from reacher_shaping.labels import in_groups, of_protocol
 from reacher_shaping.report.text import say, words
 
@@ -50,6 +52,8 @@ def caption(stem: str, cells: pd.DataFrame, runs: pd.DataFrame | None = None, pr
         episodes=" to ".join(f"{count:,}" for count in (episodes[:1] + episodes[1:][-1:])) or "the",
         interval=" or ".join(sorted(ours["interval"].unique())),
         window=WINDOW,
+        take_off=TAKE_OFF_WINDOW,
+        square=f"{1000 * SQUARE:g}",
         learned=f"{100 * LEARNED:g} %",
         burn_in=f"{100 * BURN_IN:g} %",
     )

@@ -5,13 +5,15 @@ Every number comes from the experiment's tables; here they are only chosen, roun
 
 import base64
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
 
 from reacher_shaping.analysis.comparisons import corrected, only_cell
+from reacher_shaping.analysis.hypotheses import TAKE_OFF_WINDOW
 from reacher_shaping.analysis.learning_curves import WINDOW
+from reacher_shaping.analysis.target_maps import SQUARE
 from reacher_shaping.figures import drawing
 from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.figures.style import to_bytes
@@ -29,7 +31,10 @@ COLLAPSE = 1000  # a difference in return that no policy near its target can mak
 
 @dataclass(frozen=True)
 class Section:
-    """One experiment: anchor, title, introduction, sentences, tables by caption, and names of its figures."""
+    """One experiment: anchor, title, introduction, sentences, tables by caption, and names of its figures.
+
+    `first` are tables that answer its question and so stand before the figures.
+    """
 
     name: str
     title: str
@@ -37,6 +42,7 @@ class Section:
     sentences: list[str]
     grids: dict[str, Grid]
     figures: list[str]
+    first: dict[str, Grid] = field(default_factory=dict)
 
 
 def section(
@@ -53,9 +59,12 @@ def section(
     published logs' summaries, `main` the main study's correlations, and `published` all published runs
     (`paper_tables.published_cells`).
     """
-    said, found = [], {}
+    said, found, first = [], {}, {}
     keys = [{str(name): value for name, value in row.items()} for row in given["cells"].to_dict("records")]
-    shown = outputs.views(keys, switches="effects" in given)
+    shown = outputs.views(keys, given)
+    if "hypotheses" in given:
+        said += hypotheses_sentences(given["hypotheses"])
+        first[say("study_tables.hypotheses")] = study_tables.hypotheses(given["hypotheses"])
     if "effects" not in shown:
         said.append(best_sentence(given["cells"]))
     if "effects" in shown:
@@ -63,9 +72,6 @@ def section(
         found[say("study_tables.effects")] = study_tables.effects(given["effects"])
     if "lengths" in given:
         found[say("study_tables.lengths")] = study_tables.lengths(given["lengths"])
-    if "hypotheses" in given:
-        said.append(hypotheses_sentence(given["hypotheses"]))
-        found[say("study_tables.hypotheses")] = study_tables.hypotheses(given["hypotheses"])
     if "correlation" in shown:
         said.append(correlation_sentence(given["correlation"]))
         found[say("study_tables.correlation")] = study_tables.correlation(given["correlation"], main)
@@ -84,7 +90,7 @@ def section(
     found[say("study_tables.cells")] = study_tables.cells(given["cells"])
     words = {"title": protocol_label(name).capitalize(), "question": "", **(words or {})}
     figures = [f"{name}_{view}" for view in shown]
-    return Section(name, words["title"], words["question"], [text for text in said if text], found, figures)
+    return Section(name, words["title"], words["question"], [text for text in said if text], found, figures, first)
 
 
 def document(
@@ -98,6 +104,7 @@ def document(
     for name, own_tables in given.items():
         own = section(name, own_tables, training_logs, main, published)
         parts += [f"## {own.title}", own.intro, *own.sentences]
+        parts += [f"{caption}:\n\n{text_tables.to_markdown(grid)}" for caption, grid in own.first.items()]
         for figure in own.figures:
             tables = {**own_tables, "training_logs": training_logs}
             drawn = drawing.draw(figure.removeprefix(f"{name}_"), tables, drawing.STUDY)
@@ -109,7 +116,7 @@ def document(
 
 def caption(view: str, tables: Mapping[str, pd.DataFrame], training_logs: pd.DataFrame) -> str:
     """The caption of a study's figure; of the log only what can be seen there."""
-    texts = [say(f"views.{view}.caption", window=WINDOW)]
+    texts = [say(f"views.{view}.caption", window=WINDOW, take_off=TAKE_OFF_WINDOW, square=f"{1000 * SQUARE:g}")]
     if view == "log":
         logged = tables["logged"]
         keys = ["protocol", "budget"]
@@ -135,11 +142,27 @@ def with_unit(row: Mapping[Any, Any], metric: str, name: str, low: str, high: st
     return f"{interval(row, name, low, high, *decimals(metric))}{unit and ' '}{unit}"
 
 
-def hypotheses_sentence(table: pd.DataFrame) -> str:
-    """How many of our own hypotheses the runs support, contradict and leave open."""
+def hypotheses_sentences(table: pd.DataFrame) -> list[str]:
+    """How many of our own hypotheses the runs support, contradict and leave open, and the first of them in numbers."""
     counts = table["verdict"].value_counts()
     named = {verdict: int(counts.get(verdict, 0)) for verdict in ("supported", "contradicted", "open")}
-    return say("study_sentences.hypotheses", hypotheses=len(table), **named)
+    texts = [say("study_sentences.hypotheses", hypotheses=len(table), **named)]
+    texts += [say("study_sentences.hypotheses_open")] if named["open"] else []
+    row = table.iloc[0].to_dict()
+    shown = {f"solved_{side}": round(row[f"solved_{side}"] * row["runs"]) for side in ("a", "b")}
+    shown |= {end: f"{100 * row[f'{end}_a']:.1f}" for end in ("least", "greatest")}
+    told = say(
+        "study_sentences.hypothesis",
+        claim=row["claim"].rstrip("."),
+        verdict=row["verdict"],
+        difference=interval(row, "difference", "ci_low", "ci_high", 1, 100.0),
+        p=p_value(row["p_holm"]),
+        runs=f"{row['runs']:.0f}",
+        a=row["a"],
+        b=row["b"],
+        **shown,
+    )
+    return [*texts, told]
 
 
 def best_sentence(cells: pd.DataFrame) -> str:

@@ -53,6 +53,8 @@ EFFECTS = Table(
     {"variant": TEXT, "switch": TEXT, "setting": TEXT, "effect": TEXT, "metric": TEXT, "seeds": INTEGER}, measures=True
 )
 HYPOTHESES = Table({"id": TEXT, "claim": TEXT, "a": TEXT, "b": TEXT, "predicts": TEXT, "verdict": TEXT}, measures=True)
+TAKEOFF = Table({**_CELL, "seed": INTEGER, "iteration": INTEGER, "env_steps": INTEGER, "success_rate": NUMBER})
+TARGETS = Table({**_CELL, "target_x": NUMBER, "target_y": NUMBER, "episodes": INTEGER, "final_success_rate": NUMBER})
 AGREEMENT = Table(
     {"algorithm": TEXT, "budget": INTEGER, "metric": TEXT, "our_seeds": INTEGER, "their_seeds": INTEGER}, measures=True
 )

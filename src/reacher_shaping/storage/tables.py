@@ -233,6 +233,22 @@ EXPERIMENT_TABLES = {
     "hypotheses": Entry(
         "hypotheses.csv", schemas.HYPOTHESES, "a hypothesis of our own", "judge_hypotheses", REPORT, always=False
     ),
+    "takeoff": Entry(
+        "takeoff.parquet",
+        schemas.TAKEOFF,
+        "a run and every fifth training iteration",
+        "judge_hypotheses",
+        ("plot_experiment", *REPORT),
+        always=False,
+    ),
+    "targets": Entry(
+        "targets.parquet",
+        schemas.TARGETS,
+        "a cell and a square of the plane of targets",
+        "map_targets",
+        ("plot_experiment", *REPORT),
+        always=False,
+    ),
     "agreement": Entry(
         "agreement.csv",
         schemas.AGREEMENT,
@@ -243,7 +259,8 @@ EXPERIMENT_TABLES = {
     ),
 }
 """Tables of a further study, in `results/experiments/{study}/`; `effects` needs switches, `agreement` peers,
-`hypotheses` a ledger, and `lengths` to be asked for; claims are judged where no two protocols have the same cell."""
+`hypotheses`, `takeoff` and, on Reacher, `targets` a ledger, and `lengths` to be asked for; claims are judged where no
+two protocols have the same cell."""
 
 
 def made_by(rule: str, tables: Mapping[str, Entry], folder: str) -> dict[str, str]:
