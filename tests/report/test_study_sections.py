@@ -200,6 +200,7 @@ def test_a_study_with_hypotheses_tells_them_and_their_table_first():
     given = read_studies([str(path) for path in folder.iterdir() if path.suffix in (".csv", ".parquet")])["sparse_run"]
     section = study_sections.section("sparse", given, LOGS)
     assert section.sentences[0].startswith("Of 9 hypotheses written down before the runs, 0 are supported, 0 contra")
+    assert section.sentences[3].startswith("Beside the hypotheses"), "what nobody predicted comes after, and says so"
     (grid,) = section.first.values()
     assert [row[0] for row in grid.rows] == [f"S{number}" for number in range(1, 10)]
     assert {row[-1] for row in grid.rows} == {"open"}

@@ -64,6 +64,7 @@ def section(
     shown = outputs.views(keys, given)
     if "hypotheses" in given:
         said += hypotheses_sentences(given["hypotheses"])
+        said.append(say("study_sentences.exploratory"))
         first[say("study_tables.hypotheses")] = study_tables.hypotheses(given["hypotheses"])
     if "effects" not in shown:
         said.append(best_sentence(given["cells"]))
