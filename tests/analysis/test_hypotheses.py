@@ -139,6 +139,13 @@ def test_take_off_curves_are_means_over_windows_that_do_not_overlap():
     np.testing.assert_allclose(table["success_rate"][:2], [0.1, 0.35])
 
 
+def test_a_run_shorter_than_the_window_never_takes_off_and_has_no_curve():
+    key = {"protocol": "p", "variant": "l2", "budget": 500, "alpha0": 50.0, "seed": 0}
+    progress = pd.DataFrame({"iteration": [1, 2], "env_steps": [100, 200], "success_rate": [1.0, 1.0]}).assign(**key)
+    assert math.isnan(take_off_steps(np.ones(2), np.array([100, 200])))
+    assert take_off_curves(progress).empty
+
+
 def test_the_kept_sparse_run_is_complete_and_its_verdicts_are_those_of_its_runs():
     folder = ROOT / "report/sparse_run"
     study = load_study(read_settings(ROOT / "config.yaml"))

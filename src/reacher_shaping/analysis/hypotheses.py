@@ -80,7 +80,9 @@ def permutation_p(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 def _averaged(success: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return success in training [I] averaged over each window of iterations [I - window + 1]."""
+    """Return success in training [I] averaged over windows of iterations [I - window + 1]; a shorter run has none."""
+    if len(success) < TAKE_OFF_WINDOW:
+        return np.empty(0)
     return np.convolve(success, np.full(TAKE_OFF_WINDOW, 1 / TAKE_OFF_WINDOW), "valid")
 
 
