@@ -30,6 +30,9 @@ def test_take_off_figure_has_a_line_per_run_in_the_panel_of_its_cell():
     titles = [panels[0, column].get_title().split("\n") for column in range(3)]
     assert titles == [["none"], ["L2", "α₀ = 1"], ["L2", "α₀ = 50"]]
     assert panels[1, 2].get_title() == "", "the panel above has the same cell"
+    assert not [axes for axes in panels.values() if axes.get_title(loc="left")], "seaborn's own are gone"
+    named = {key: [text.get_text() for text in axes.texts] for key, axes in panels.items()}
+    assert named == {(0, 0): ["p"], (0, 1): [], (0, 2): [], (1, 2): ["q"]}
     for key, place in places.items():
         lines = sorted(tuple(line.get_ydata()) for line in drawn.data_lines(panels[key]))
         expected = [tuple((place + seed + step) / 30 for step in (5, 10, 15)) for seed in range(3)]

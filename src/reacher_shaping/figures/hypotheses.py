@@ -97,18 +97,14 @@ def _cell(row: Mapping[Any, Any]) -> str:
 def _explain(panels: Any, named: pd.DataFrame, protocols: list[str], names: list[str], beside: float) -> None:
     """Name the cells above the columns and the protocols `beside` the rows; leave out panels of cells that are not."""
     there = set(named[["protocol", "cell"]].itertuples(index=False, name=None))
+    shown = np.array([[(protocol, name) in there for name in names] for protocol in protocols])
     for (row, column), axes in np.ndenumerate(panels):
         own: Axes = axes
-        own.set_title("")
-        own.set_visible((protocols[row], names[column]) in there)
-        if not column or (protocols[row], names[column - 1]) not in there:
-            own.annotate(
-                protocol_label(protocols[row]).replace(" ", "\n"),
-                (-beside, 0.5),
-                xycoords="axes fraction",
-                ha="right",
-                va="center",
-                fontsize=8.5,
-            )
-        if not row or (protocols[row - 1], names[column]) not in there:
-            own.set_title(names[column], fontsize=8.5, loc="center")
+        own.set_visible(bool(shown[row, column]))
+        own.set_title("", loc="left")
+        own.set_title(names[column] if not shown[:row, column].any() else "", fontsize=8.5, loc="center")
+        own.tick_params(labelbottom=not shown[row + 1 :, column].any())
+        if not shown[row, :column].any():
+            label = protocol_label(protocols[row]).replace(" ", "\n")
+            place: dict[str, Any] = {"xycoords": "axes fraction", "ha": "right", "va": "center", "fontsize": 8.5}
+            own.annotate(label, (-beside, 0.5), **place)
