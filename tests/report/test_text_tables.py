@@ -1,8 +1,13 @@
 """Tables as text: what is counted is said, and the numbers are those of the tables."""
 
+from pathlib import Path
+
 import synthetic
 
 from reacher_shaping.report import paper_tables, text_tables
+from reacher_shaping.settings.study import load_study, read_settings
+
+CONFIG = Path(__file__).parents[2] / "config.yaml"
 
 
 def test_seeds_are_counted_per_variant_and_setting():
@@ -30,3 +35,19 @@ def test_markdown_has_a_line_per_row_and_says_when_there_is_none():
     assert text_tables.to_markdown(text_tables.Grid(["Variant", "Seeds"], [])).endswith(
         "| No such cells in this study. |  |"
     )
+
+
+def test_every_source_that_the_configuration_gives_stands_beside_its_setting():
+    grid = text_tables.settings_grid(load_study(CONFIG).model_dump(mode="json"))
+    rows = {row[0]: dict(zip(grid.headings[1:], row[1:], strict=True)) for row in grid.rows}
+    given = [
+        (f"{part}: {key}".replace("_", " "), name.replace("_", " "), value["source"])
+        for name, protocol in read_settings(CONFIG)["protocols"].items()
+        for part, settings in protocol.items()
+        if part != "from"
+        for key, value in settings.items()
+    ]
+    assert len(given) > 50
+    assert [one for one in given if not rows[one[0]][one[1]].endswith(f" ({one[2]})")] == []
+    assert rows["ppo: discount"]["released"] == "0.99 (paper 3.2)", "taken over from the protocol that it comes from"
+    assert rows["environment: success radius"]["paper"] == "not set"

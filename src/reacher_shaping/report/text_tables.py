@@ -72,6 +72,8 @@ def _flatten(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 def plain(value: Any) -> str:
     """A setting as people write it."""
+    if value is None:
+        return say("tables.unset")
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int):
