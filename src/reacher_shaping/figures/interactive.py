@@ -114,7 +114,7 @@ def success_at_radius(radii: pd.DataFrame) -> Chart:
     )
 
 
-CHARTS: dict[str, tuple[str, Callable[[pd.DataFrame], alt.LayerChart]]] = {
+CHARTS: dict[str, tuple[str, Callable[[pd.DataFrame], Chart]]] = {
     "figure_1": ("curves", learning_curves),
     "success_by_radius": ("radii", success_at_radius),
 }
