@@ -174,19 +174,19 @@ def test_training_of_a_killed_head_is_waited_for_and_not_done_again(slurm, proje
     assert jobs("R"), "the job outlives it"
     unlocked = project.python("workflow/unlock.py", ".")
     assert "Waiting for the jobs" in unlocked.stdout, unlocked.stdout + unlocked.stderr
-    policy = project.folder / "results" / BLOCK / "policy.pt"
-    trained = policy.stat().st_mtime_ns
+    record = project.folder / "results" / BLOCK / "training.json"  # tells times
+    trained = record.read_bytes()
     assert_done(start(project))
     assert computed(project.folder) == of_block(undisturbed)
     taken_over = log(project) == "takes over the training that a job before has finished\n"
-    assert taken_over or policy.stat().st_mtime_ns == trained
+    assert taken_over or record.read_bytes() == trained
 
 
 def test_job_over_its_time_gets_more_and_goes_on(slurm, project, undisturbed):
     """SLURM counts whole minutes, so the training is slowed down to take longer than one."""
     state = "            state = current\n"
     with project.edited("src/reacher_shaping/jobs/training_job.py", state, state + "            time.sleep(3)\n"):
-        assert_done(start(project, "--set-resources", "train_block:runtime=attempt", "evaluate_block:runtime=0"))
+        assert_done(start(project, "--set-resources", "train_block:runtime=attempt**4", "evaluate_block:runtime=0"))
     assert computed(project.folder) == of_block(undisturbed)
     assert log(project).startswith("goes on from iteration")
 
@@ -194,6 +194,7 @@ def test_job_over_its_time_gets_more_and_goes_on(slurm, project, undisturbed):
 def test_full_queue_is_waited_for(slurm, project, undisturbed):
     """Another's job has all cores of the cluster."""
     run("sbatch", "--cpus-per-task=2", "--output=/dev/null", "--wrap", "sleep 900")
+    wait_for(lambda: jobs("R"))
     try:
         running = start(project)
         wait_for(lambda: jobs("PD"))
