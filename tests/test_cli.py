@@ -276,7 +276,7 @@ def test_kind_of_video_is_known_in_any_case_and_length_of_name(name, ours, tmp_p
 
 def test_name_of_a_file_is_no_formula_in_the_table(released, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("=cmd", "+1", "@a"):
+    for name in ("=cmd", "+1", "@a", "\t=cmd"):
         released.rename(name)
         assert cli.main(["evaluate", name, "--episodes", "1"]) == 0
         [run] = table(capsys)["run"]

@@ -4,7 +4,8 @@
 
 The zip holds the files that the study's crate lists, the crate's metadata and the seals that the jobs left beside the
 files; the same files give the same bytes.
-Ends with 1, and packs nothing, if a file is missing or has another content than the crate says.
+Ends with 1, and packs nothing, if a file is missing or has another content than the crate says, or if another file than
+the archive made before would be replaced.
 """
 
 import sys
@@ -14,8 +15,9 @@ from pathlib import Path
 from verify import crate_problems
 
 from reacher_shaping.storage.crate import METADATA, checksums
-from reacher_shaping.storage.files import ArtifactError, replacing, seal_of
+from reacher_shaping.storage.files import ArtifactError, replacing, require_writable, seal_of
 
+USUAL = Path("build/reacher-shaping-study.zip")
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # of a zip's time stamps; the files' own would differ from copy to copy
 
 
@@ -41,6 +43,7 @@ def main(folder: Path, archive: Path) -> int:
         print("\n".join(found), file=sys.stderr)
         return 1
     try:
+        require_writable(archive, [], force=archive == folder / USUAL)
         count = pack(folder, archive)
     except ArtifactError as error:
         print(error, file=sys.stderr)
@@ -52,4 +55,4 @@ def main(folder: Path, archive: Path) -> int:
 if __name__ == "__main__":
     given = [Path(argument) for argument in sys.argv[1:]]
     folder = given[0] if given else Path()
-    sys.exit(main(folder, given[1] if len(given) > 1 else folder / "build" / "reacher-shaping-study.zip"))
+    sys.exit(main(folder, given[1] if len(given) > 1 else folder / USUAL))

@@ -62,10 +62,11 @@ def crate_problems(folder: Path) -> list[str]:
 def main(folder: Path) -> int:
     """Print what is wrong, or how much is right; return the exit code."""
     count, crate = len(blocks(folder)), folder / METADATA
+    found = reference_problems(folder)
     if not count:
-        print(f"{folder / 'results'}: holds no seed blocks; run the study first: make reproduce")
+        print("\n".join([*found, f"{folder / 'results'}: holds no seed blocks; run the study first: make reproduce"]))
         return 1
-    found = block_problems(folder) + seal_problems(folder) + reference_problems(folder)
+    found = block_problems(folder) + seal_problems(folder) + found
     found += crate_problems(folder) if crate.exists() else []
     if found:
         print("\n".join(dict.fromkeys(found)))

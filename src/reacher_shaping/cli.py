@@ -200,7 +200,7 @@ def _lacks_memory(error: Exception) -> bool:
 
 def _no_formula(path: Path) -> str:
     """Return the path as a spreadsheet will not compute it: `=cmd.pt` is the same file as `./=cmd.pt`."""
-    return f"./{path}" if str(path).startswith(("=", "+", "-", "@")) else str(path)
+    return f"./{path}" if str(path).startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else str(path)
 
 
 def _environment(options: argparse.Namespace, trained: "Environment") -> "Environment":

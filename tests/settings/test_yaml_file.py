@@ -1,6 +1,7 @@
 """Files of settings are YAML 1.2, bounded, and refused in one line that names the file, the line and the fault."""
 
 import math
+import os
 
 import pytest
 
@@ -71,6 +72,12 @@ def test_names_and_contents_that_steer_a_terminal_are_spelt_out(tmp_path, text):
         read_mapping(path)
     assert str(refused.value).isprintable()
     assert r"\x1b[31m.yaml" in str(refused.value)
+
+
+def test_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(ConfigError, match=r"pipe\.yaml: is no file; allowed: a file of settings"):
+        read_mapping(tmp_path / "pipe.yaml")
 
 
 def test_an_alias_is_what_it_stands_for(tmp_path):

@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 from project import Project, computed
 
+from reacher_shaping.storage.files import read_json
+
 KILLS = int(os.environ.get("REACHER_SHAPING_KILLS", "3"))
 TARGET = "results/runs.parquet"
 CELL = "results/paper/l2/61440/alpha1"
@@ -131,6 +133,32 @@ def test_block_that_an_orphan_has_finished_is_taken_over(project, undisturbed):
     log = project.folder / "results/logs" / finished.parent.relative_to(project.folder / "results") / "train.log"
     assert log.read_text() == "takes over the training that a job before has finished\n"
     assert_whole(project, undisturbed)
+
+
+def test_checkpoint_of_other_versions_is_not_gone_on_from(project, tmp_path_factory):
+    """Neither is the checkpoint of the old versions lost: with them again, the training goes on from it."""
+    target = f"{CELL}/seeds0-0/training.json"
+    log = project.folder / target.replace("results", "results/logs").replace("training.json", "train.log")
+    running = project.start("-m", "snakemake", "--", target)
+    wait_for(lambda: checkpoints(project))
+    running.kill()
+    for process in processes(project, ".train_block.py"):
+        os.kill(process, signal.SIGKILL)
+    running.communicate()
+    wait_for(lambda: not processes(project, ".train_block.py"))
+    assert project.python("workflow/unlock.py", ".").returncode == 0
+    with_old = project.copied(tmp_path_factory.mktemp("kept") / "study")
+    other = tmp_path_factory.mktemp("other") / "mujoco-9.9.9.dist-info"
+    other.mkdir()
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: mujoco\nVersion: 9.9.9\n")
+    project.environment = {"PYTHONPATH": f"{other.parent}{os.pathsep}{project.folder / 'src'}"}
+    for again, goes_on in ((project, False), (with_old, True)):
+        done = again.snakemake("--", target)
+        assert done.returncode == 0, done.stderr[-3000:]
+        told = (again.folder / log.relative_to(project.folder)).read_text()
+        assert ("goes on from iteration" in told) is goes_on
+    assert read_json(project.folder / target)["versions"]["mujoco"] == "9.9.9"
+    assert read_json(with_old.folder / target)["versions"]["mujoco"] != "9.9.9"
 
 
 def test_second_snakemake_in_a_folder_is_told_who_works_there(project):

@@ -1,12 +1,16 @@
 """A result is believed for what it says: settings, seeds and checksums, on the real workflow at toy scale."""
 
+import os
+import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from project import ROOT, Project
 
-from reacher_shaping.storage.files import read_json, seal_of, sha256
+from reacher_shaping.storage.files import read_json, seal_of, sha256, write_json
 from reacher_shaping.storage.reference import checksums
 
 NONE, DECAY = "results/paper/none/2048/alpha1/seeds0-0", "results/paper/decay200k_l2sq/2048/alpha0.5/seeds0-0"
@@ -151,6 +155,44 @@ def test_unpacked_archive_still_knows_what_its_files_were(toy_study, tmp_path):
     named = toy_study.python("workflow/verify.py", str(tmp_path / "out"))
     assert named.returncode == 1
     assert f"{figure}: has changed" in named.stdout
+
+
+def test_archive_packs_no_file_out_of_the_study_and_replaces_none(copy, tmp_path):
+    secret, archive = tmp_path / "secret.txt", tmp_path / "study.zip"
+    secret.write_text("secret")
+    archive.write_text("mine")
+    done = copy.python("workflow/archive.py", ".", str(archive))
+    assert (done.returncode, done.stderr.count("\n"), archive.read_text()) == (1, 1, "mine")
+    assert f"{archive}: is there already" in done.stderr
+    archive.unlink()
+    crate = copy.folder / "ro-crate-metadata.json"
+    content = read_json(crate)
+    content["@graph"].append({"@id": "../secret.txt", "@type": "File", "sha256": sha256(secret)})
+    write_json(crate, content)
+    seal_of(crate).unlink()
+    done = copy.python("workflow/archive.py", ".", str(archive))
+    assert done.returncode == 1
+    assert "ro-crate-metadata.json: lists ../secret.txt, which is no file of the study" in done.stderr
+    assert not archive.exists()
+
+
+def test_make_report_after_a_changed_config_shows_nothing_and_says_why(copy, toy_settings):
+    """The real target, less the jobs that draw, which would only take their time."""
+    shutil.copy(ROOT / "Makefile", copy.folder)
+    (copy.folder / ".venv").symlink_to(sys.prefix)
+    page = copy.folder / "report/report.html"
+    before = page.read_bytes()
+    make = ["make", "--assume-old=.venv/.ready", "report", "FROM_TABLES="]
+    environment = os.environ | {"PYTHONPATH": str(copy.folder / "src")}
+    with copy.configured(evaluation={"episodes": 20, "radius": 0.05}, **faster(toy_settings)):
+        done = subprocess.run(make, cwd=copy.folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    told = (
+        rf"{NONE}/\w+\.json: tells of settings\.cell\.protocol\.ppo\.learning_rate = 0\.0003, where 0\.01 is asked for"
+    )
+    assert re.search(told, done.stderr)
+    assert "Traceback" not in done.stderr
+    assert not page.exists() or page.read_bytes() == before
 
 
 def test_blocks_of_different_versions_are_named(copy):

@@ -65,6 +65,16 @@ def test_a_damaged_manifest_is_named(block, content):
     assert str(block / "manifest.json") in said[0]
 
 
+def test_changed_reference_run_is_named_without_a_study_too(tmp_path):
+    kept = tmp_path / "report" / "reference"
+    write_text(kept / "claims.csv", "as kept")
+    write_json(kept / "manifest.json", {"tables": {"claims.csv": sha256(kept / "claims.csv")}})
+    write_text(kept / "claims.csv", "edited")
+    done = subprocess.run([sys.executable, SCRIPT, tmp_path], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert f"{kept / 'claims.csv'}: has changed since it was made" in done.stdout
+
+
 def test_no_results_are_nothing_to_believe(tmp_path):
     done = subprocess.run([sys.executable, SCRIPT, tmp_path], capture_output=True, text=True, check=False)
     assert done.returncode == 1

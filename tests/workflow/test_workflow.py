@@ -373,3 +373,10 @@ def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp
         assert 'id="mine_effects"' in page
         assert "Of 1 hypotheses written down before the runs" in page
         assert 'id="mine_targets"' in page
+        with copy.configured(evaluation={"episodes": 20, "radius": 0.05}):
+            rule = "compare_with_peers"
+            done = copy.snakemake(
+                "--forcerun", rule, "--allowed-rules", rule, "--", "results/experiments/mine/agreement.csv"
+            )
+        assert done.returncode != 0
+        assert "seed0.json: tells of settings.evaluation.radius = 0.02, where 0.05 is asked for" in done.stderr

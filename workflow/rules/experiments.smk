@@ -238,6 +238,9 @@ rule compare_with_peers:
         runtime=growing(30),
     params:
         protocol=of_experiment(lambda cells, seeds: cells[0].protocol.name),
+        asked=lambda wildcards: asked_of_peers(
+            STUDY.experiments[wildcards.experiment].peers, EXPERIMENTS[wildcards.experiment][0].protocol
+        ),
         code=code("compare_with_peers"),
     script:
         "../scripts/compare_with_peers.py"

@@ -5,6 +5,16 @@ PEER_RUNS = expand(
 PEERS = [path for path in ["results/peers.parquet"] if made(path)]  # an input only once it is there
 
 
+def asked_of_peers(peers, protocol):
+    """What the manifests of other algorithms' runs must tell, in the order of their files."""
+    settings = {"protocol": protocol.model_dump(), "evaluation": STUDY.evaluation.model_dump()}
+    return [
+        as_json({"algorithm": algorithm, "seeds": [seed], "env_steps": budget, "settings": settings})
+        for algorithm, budget in peers.budgets.items()
+        for seed in range(peers.seeds)
+    ]
+
+
 rule peers:
     input:
         PEER_RUNS,
@@ -50,6 +60,7 @@ rule gather_peers:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
+        asked=asked_of_peers(STUDY.peers, STUDY.cells[0].protocol),
         code=code("gather_peers"),
     script:
         "../scripts/gather_peers.py"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import stat
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -67,7 +68,10 @@ def check_overlays(command: Sequence[str]) -> None:
 def _read(path: Path | str, loader: type[yaml.FullLoader | yaml.SafeLoader]) -> Any:
     name = spelt_out(str(path))
     try:
-        if Path(path).stat().st_size > MOST_BYTES:
+        found = Path(path).stat()
+        if not stat.S_ISREG(found.st_mode):  # to read a pipe may take for ever, and Snakemake reads it again
+            raise ConfigError(f"{name}: is no file; allowed: a file of settings")
+        if found.st_size > MOST_BYTES:
             raise ConfigError(f"{name}: is too large for settings; allowed: at most {MOST_BYTES} bytes")
         content = yaml.load(Path(path).read_text(encoding="utf-8"), loader)
         _bound(content)
