@@ -38,6 +38,7 @@ with logged(snakemake) as say:
         cell = Cell.model_validate_json(json.dumps(trained.settings["cell"]))
         seed, record = trained.seeds[0], read_json(training)
         if not shown:
+            reference = cell  # the untrained network and the controller are those of the first
             start = shown_policies.untrained(cell, seed).weights()
             shown["untrained"] = kept("untrained", cell, seed, start, trained.settings, {})
         weights = {key: tensor[:1] for key, tensor in trained.weights.items()}
@@ -45,6 +46,6 @@ with logged(snakemake) as say:
         shown[name] = kept(name, cell, seed, weights, trained.settings, provenance)
         say(f"{name}: seed {seed} of {cell.name}")
     if shown:
-        act, numbers = shown_policies.controller(cell)
-        shown["controller"] = {"gains": numbers} | shown_policies.measured(act, cell, mode="deterministic", **how)
+        act, numbers = shown_policies.controller(reference)
+        shown["controller"] = {"gains": numbers} | shown_policies.measured(act, reference, mode="deterministic", **how)
     write_json(snakemake.output.summary, shown)
