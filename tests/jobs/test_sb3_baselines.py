@@ -9,7 +9,6 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-import synthetic
 from cells import cell
 
 from reacher_shaping.figures.drawing import draw
@@ -77,8 +76,8 @@ def test_runs_fit_their_table(tmp_path):
     assert read_table(tmp_path / "peers.parquet", schemas.PEERS).equals(run)
 
 
-def _snakemake(folder, *arguments):
-    """Snakemake on the reference run's report in `folder`; what it says."""
+def _snakemake(folder, *arguments, target="report/reference.html"):
+    """Snakemake on the reference run's report in `folder`, or on another target; what it says."""
     command = [
         sys.executable,
         "-m",
@@ -90,7 +89,7 @@ def _snakemake(folder, *arguments):
         "--cores",
         "1",
     ]
-    command += [*arguments, "--", "report/reference.html"]
+    command += [*arguments, "--", target]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     assert "Runs are missing" not in done.stderr, "the reference run has no runs to make again"
@@ -122,7 +121,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
         write_table(radii, runs.assign(mode="stochastic", radius=EVALUATION.radius)[own], schemas.RUN_RADII)
     for there in (False, True):
         if there:
-            write_table(table, synthetic.peers(), schemas.PEERS)
+            shutil.copy(KEPT / "peers.parquet", table)
         jobs = _planned(tmp_path)
         assert ("results/peers.parquet" in jobs["plot_figures"][0]) is there
         assert ("figures/peers.svg" in jobs["plot_figures"][1]) is there
@@ -133,9 +132,12 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     _touch(tmp_path, made)  # only what shows the peers is made
     other = tmp_path / "seeds.yaml"
     other.write_text("seeds: 77\nevaluation: {radius: 0.05}\n")
-    rules = ["judge_claims", "plot_figures", "build_reference_report"]
-    _snakemake(tmp_path, "--configfile", other, "--forcerun", "judge_claims", "--allowed-rules", *rules)
-    claims = read_table(tmp_path / "results" / "claims.csv", schemas.CLAIMS).set_index("id")
+    rules = ["plot_figures", "build_reference_report"]
+    _snakemake(tmp_path, "--configfile", other, "--allowed-rules", *rules)
+    judged = tmp_path / "judged"  # apart: a kept run's report refuses tables that are not those that were kept
+    shutil.copytree(tmp_path / "results", judged / "results")
+    _snakemake(judged, "--forcerun", "judge_claims", "--allowed-rules", "judge_claims", target="results/claims.csv")
+    claims = read_table(judged / "results" / "claims.csv", schemas.CLAIMS).set_index("id")
     assert claims.loc["C19", "verdict"] != "untestable"
     assert (tmp_path / "figures" / "peers.svg").exists()
     report = (tmp_path / "report" / "reference.html").read_text(encoding="utf-8")
