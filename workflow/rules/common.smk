@@ -111,3 +111,13 @@ def one_of(names):
 
 def as_json(settings):
     return json.dumps(settings, sort_keys=True)
+
+
+def asked_of_peers(peers, protocol):
+    """What the manifests of other algorithms' runs must tell, in the order of their files."""
+    settings = {"protocol": protocol.model_dump(), "evaluation": STUDY.evaluation.model_dump()}
+    return [
+        as_json({"algorithm": algorithm, "seeds": [seed], "env_steps": budget, "settings": settings})
+        for algorithm, budget in peers.budgets.items()
+        for seed in range(peers.seeds)
+    ]

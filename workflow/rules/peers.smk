@@ -5,16 +5,6 @@ PEER_RUNS = expand(
 PEERS = [path for path in ["results/peers.parquet"] if made(path)]  # an input only once it is there
 
 
-def asked_of_peers(peers, protocol):
-    """What the manifests of other algorithms' runs must tell, in the order of their files."""
-    settings = {"protocol": protocol.model_dump(), "evaluation": STUDY.evaluation.model_dump()}
-    return [
-        as_json({"algorithm": algorithm, "seeds": [seed], "env_steps": budget, "settings": settings})
-        for algorithm, budget in peers.budgets.items()
-        for seed in range(peers.seeds)
-    ]
-
-
 rule peers:
     input:
         PEER_RUNS,
