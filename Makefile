@@ -13,10 +13,6 @@ PLUGIN := $(if $(findstring slurm,$(PROFILE)),python -c 'import snakemake_execut
 SNAKEMAKE := snakemake --workflow-profile $(PROFILE) $(if $(VERBOSE),--quiet host)
 
 export PATH := $(CURDIR)/$(BIN):$(PATH)
-# Where the home folder cannot be written, caches go into build/.
-ifneq ($(shell mkdir -p "$${XDG_CACHE_HOME:-$$HOME/.cache}" 2> /dev/null && test -w "$${XDG_CACHE_HOME:-$$HOME/.cache}" && echo yes),yes)
-export XDG_CACHE_HOME := $(CURDIR)/build/cache
-endif
 
 .DEFAULT_GOAL := help
 .PHONY: help setup reproduce quick plan cells restore report compare check-bits archive verify reference test test-fast check lock bench peers clean

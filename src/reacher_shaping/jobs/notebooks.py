@@ -7,7 +7,6 @@ relative to it stay relative in what the notebook shows.
 """
 
 import argparse
-import json
 import logging
 import os
 import sys
@@ -55,8 +54,6 @@ def _no_personal_settings(folder: Path) -> Iterator[None]:
     for name in [name for name in os.environ if name.startswith(("JUPYTER", "IPYTHON", "MPL", "MATPLOTLIB"))]:
         del os.environ[name]
     os.environ.update({name: str(folder / name.lower()) for name in names})
-    quiet = {"IPKernelApp": {"log_level": logging.ERROR}}  # not a warning for each notebook that it talks by TCP
-    write_text(folder / "ipythondir/profile_default/ipython_kernel_config.json", json.dumps(quiet))
     try:
         yield
     finally:

@@ -7,7 +7,6 @@ from typing import Any
 from reacher_shaping.report.loader import Study
 from reacher_shaping.report.summary import summary
 from reacher_shaping.report.text import say
-from reacher_shaping.storage.reference import spent
 
 _BLOCK = re.compile(r"(<!-- reference: begin -->\n).*(<!-- reference: end -->)", re.DOTALL)
 
@@ -24,12 +23,11 @@ def headline(study: Study, record: Mapping[str, Any], figure: str) -> str:
 
 
 def _facts(record: Mapping[str, Any]) -> str:
-    """Say in one sentence what the reference run was and what it took."""
+    """Say in one sentence what the reference run was and which code trained it."""
     blocks = record["blocks"]
     seeds = sorted({seed for block in blocks for seed in block["seeds"]})
-    steps, hours = spent(blocks)
     every = [*blocks, *(block for study in record.get("experiments", {}).values() for block in study)]
-    return say("readme.facts", seeds=len(seeds), steps=steps / 1e6, hours=hours, code=_code(every))
+    return say("readme.facts", seeds=len(seeds), code=_code(every))
 
 
 def _code(blocks: Sequence[Mapping[str, Any]]) -> str:

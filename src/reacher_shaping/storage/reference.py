@@ -195,8 +195,3 @@ def published_bits(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     smallest = min(blocks, key=lambda block: int(block["env_steps"]))
     kept = ("settings", "seeds", "weights", "kernels", "core_type", "machine", "versions")
     return {name: smallest[name] for name in kept}
-
-
-def spent(blocks: Sequence[Mapping[str, Any]]) -> tuple[int, float]:
-    """Environment steps and core hours of blocks."""
-    return sum(block["env_steps"] for block in blocks), sum(block["cpu_seconds"] for block in blocks) / 3600
