@@ -86,7 +86,7 @@ reference: $(READY) ## make the run in results/ the reference run: report/refere
 	@python workflow/keep_reference.py $(if $(FORCE),--force)
 
 test: $(READY) ## the tests
-	python -m pytest
+	python -m pytest --numprocesses logical --dist loadfile
 
 test-fast: $(READY) ## the tests that take no seconds, in under a minute
 	python -m pytest -m "not slow"

@@ -85,7 +85,9 @@ def test_every_import_is_of_a_declared_package(folder):
 
 def test_every_dependency_is_used():
     files = ["Makefile", ".pre-commit-config.yaml", "workflow/install.py", "workflow/notebooks/correlation.py"]
-    words = " ".join((ROOT / file).read_text(encoding="utf-8") for file in files).replace("kernelspec", "ipykernel")
+    words = " ".join((ROOT / file).read_text(encoding="utf-8") for file in files)
+    for option, package in (("kernelspec", "ipykernel"), ("--numprocesses", "pytest-xdist")):
+        words = words.replace(option, package)
     used = NO_IMPORT.union(*map(imported, EXTRAS), re.findall(r"[\w-]+", words))
     declared = {name(pin) for pin in PROJECT["dependencies"] + PROJECT["optional-dependencies"]["dev"]}
     assert declared - used == set()
