@@ -81,7 +81,7 @@ def test_setup_in_a_folder_that_no_job_can_run_in_ends_before_anything_is_instal
     (clone / "workflow").mkdir(parents=True)
     for file in ("Makefile", "pyproject.toml", "requirements.txt", "workflow/install.py"):
         shutil.copy(ROOT / file, clone / file)
-    shell = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}  # `make test` is around it
+    shell = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}  # not `make test`
     done = subprocess.run(["make", "setup"], cwd=clone, env=shell, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     [line] = [line for line in done.stderr.splitlines() if not line.startswith("make:")]
