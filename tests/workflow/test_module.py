@@ -1,11 +1,15 @@
 """The workflow as a module of another one, below a prefix, with a cell that it does not have itself."""
 
+import re
+import shutil
 import subprocess
 import sys
 
 import pytest
 import yaml
 from project import ROOT
+
+from reacher_shaping.settings.study import load_study, read_settings
 
 OUTER = """
 module shaping:
@@ -35,6 +39,21 @@ rule count:
     shell:
         "wc -l < {{input}} > {{output}}"
 """
+
+DEPLOYED = """
+configfile: "config/config.yaml"
+
+
+module reacher_shaping:
+    snakefile:
+        "{root}/Snakefile"
+    config:
+        config
+
+
+use rule * from reacher_shaping
+"""
+"""As `snakedeploy deploy-workflow` writes it, beside copies of the workflow's config/ and profiles/."""
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +86,19 @@ def test_whole_study_is_planned_below_the_prefix(outer):
     assert "shaping/report/report.html" in outputs
     assert "shaping/results/media/paper-l2-2048-alpha0.125.gif" in outputs
     assert [name for name in outputs if not name.startswith("shaping/")] == []
+
+
+def test_deployed_copy_plans_the_study_and_follows_its_own_config_file(tmp_path):
+    for folder in ("config", "profiles"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    (tmp_path / "workflow").mkdir()
+    (tmp_path / "workflow/Snakefile").write_text(DEPLOYED.format(root=ROOT))
+    trained = "train_block +{}\n"
+    whole = load_study(read_settings(ROOT / "config.yaml"))
+    blocks = len(whole.cells) * -(-whole.seeds // whole.seeds_per_block)
+    assert re.search(trained.format(blocks), snakemake(tmp_path, "--dry-run"))
+    (tmp_path / "config/config.yaml").write_text("seeds: 1\n")
+    assert re.search(trained.format(len(whole.cells)), snakemake(tmp_path, "--dry-run"))
 
 
 def test_catalogue_and_snakedeploy_find_what_they_ask_for():
