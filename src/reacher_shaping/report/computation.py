@@ -8,6 +8,7 @@ import pandas as pd
 
 from reacher_shaping.report.text import say
 from reacher_shaping.report.text_tables import Grid
+from reacher_shaping.storage.provenance import mixed_versions
 
 Manifests = Sequence[Mapping[str, Any]]
 NUMBERS = ("env_steps", "wall_seconds", "cpu_seconds", "env_steps_per_second")
@@ -38,7 +39,7 @@ def toy(cells: pd.DataFrame) -> str:
 
 
 def grid(manifests: Manifests) -> Grid | None:
-    """Code, machine, threads, sums of steps and time, speed and versions; None without manifests."""
+    """Code, machine, threads, sums of steps and time, speed and versions, mixed ones with a word; None without manifests."""
     if not manifests:
         return None
     several = {
@@ -64,6 +65,8 @@ def grid(manifests: Manifests) -> Grid | None:
         for name, version in manifest.get("versions", {}).items():
             packages.setdefault(name, {})[str(version)] = None
     rows.append([say("computation.versions"), ", ".join(f"{name} {' / '.join(own)}" for name, own in packages.items())])
+    if mixed := mixed_versions(manifest for manifest in manifests if "versions" in manifest):
+        rows.append([say("computation.bits"), say("computation.mixed", packages=mixed)])
     return Grid([say("computation.what"), say("computation.value")], rows, frozenset({0, 1}))
 
 
