@@ -3,8 +3,8 @@
     python benchmarks/schedule_check.py
 
 Twelve blocks are trained and evaluated twice by the real workflow, about eight minutes; the machine should be idle.
-Their own records give the rates and starts with which `schedule.py` lays them on the cores. What Snakemake itself takes,
-measured by a run with nothing left to do, is told apart.
+Their own records give the rates with which `schedule.py` lays them on the cores. What Snakemake itself takes, by a run
+with nothing left to do, is told apart.
 """
 
 import shutil

@@ -39,7 +39,7 @@ def toy(cells: pd.DataFrame) -> str:
 
 
 def grid(manifests: Manifests) -> Grid | None:
-    """Code, machine, threads, sums of steps and time, speed and versions, mixed ones with a word; None without manifests."""
+    """Code, machine, threads, sums of steps and time, speed and versions (a word where bits mix); None without any."""
     if not manifests:
         return None
     several = {
