@@ -32,10 +32,11 @@ CORES = (1, 2)
 
 def run(folder: Path, cores: int) -> float:
     """Let the workflow make every block in `folder` on `cores` cores; return the seconds it took."""
-    command = [sys.executable, "-m", "snakemake", "--snakefile", ROOT / "Snakefile", "--directory", folder]
-    command += ["--workflow-profile", ROOT / "profiles/default", "--configfile", folder / "study.yaml"]
+    given: dict[str, object] = {"snakefile": ROOT / "Snakefile", "configfile": folder / "study.yaml", "cores": cores}
+    given |= {"workflow-profile": ROOT / "profiles/default", "directory": folder, "until": "evaluate_block"}
+    command = [sys.executable, "-m", "snakemake", *(f"--{name}={value}" for name, value in given.items())]
     begun = time.perf_counter()
-    subprocess.run([*command, "--cores", str(cores), "--until", "evaluate_block"], check=True, capture_output=True)
+    subprocess.run(command, check=True, capture_output=True)
     return time.perf_counter() - begun
 
 
