@@ -99,8 +99,9 @@ def make(folder, study, grid, seeds, **changes):
     start = shown_policies.untrained(cell, 0)
     write_policy(folder / "policies" / "untrained.pt", [0], start.weights(), {"cell": cell.settings()})
     acts = {"untrained": start.act, "controller": shown_policies.controller(cell)[0]}
+    radius = study["evaluation"]["radius"]
     shown = {
-        name: shown_policies.measured(act, cell, mode="stochastic", episodes=2, radius=0.02)
+        name: shown_policies.measured(act, cell, mode="stochastic", episodes=2, radius=radius)
         for name, act in acts.items()
     }
     shown["untrained"] |= {"cell": cell.name, "seed": 0, "weights": weights_checksum(start.weights())}

@@ -415,7 +415,7 @@ def test_sensitivity_judges_every_claim_under_every_choice():
     assert (frame.groupby("choice").size() == len(LEDGER)).all()
     at = frame.set_index(["id", "choice"])
     assert at.loc[("C18", "mean action instead of samples"), "measured"] == pytest.approx(0.9)
-    assert at.loc[("C18", "radius 0.03 m instead of 0.02"), "measured"] == pytest.approx(0.7)
+    assert at.loc[("C18", "radius 30 mm instead of 20"), "measured"] == pytest.approx(0.7)
     first = own[(own["variant"] == "none") & (own["budget"] == 1_000_000) & (own["seed"] < 5)]
     assert at.loc[("C18", "the first 5 seeds alone"), "measured"] == pytest.approx(first["success_rate"].mean())
     assert at.loc[("C18", sensitivity.AS_TESTED), "verdict"] == judge(own).loc["C18", "interval_verdict"]

@@ -98,13 +98,15 @@ def test_controller_acts_as_the_engines(page, cell):
 
 
 @pytest.mark.parametrize("name", ["untrained", "controller"])
-def test_success_is_that_of_the_evaluation_within_binomial_error(page, cell, name):
+@pytest.mark.parametrize("radius", [0.02, 0.05])
+def test_success_is_that_of_the_evaluation_within_binomial_error(page, cell, name, radius):
     policy = shown_policies.untrained(cell, 0)
     act, gains = (policy.act, None) if name == "untrained" else shown_policies.controller(cell)
     mode = "stochastic" if name == "untrained" else "deterministic"
-    ours = evaluate(act, [0], mode=mode, episodes=1000, radius=0.02, environment=cell.protocol.environment, root_seed=1)
+    how = {"mode": mode, "episodes": 1000, "radius": radius, "root_seed": 1}
+    ours = evaluate(act, [0], environment=cell.protocol.environment, **how)
     one = {"weights": acting(policy.weights())} if gains is None else {"gains": gains}
-    found = page.evaluate("one => arm.rates(arm.policyOf(one), 1000, 7, true)", one)
+    found = page.evaluate("([one, radius]) => arm.rates(arm.policyOf(one), 1000, 7, true, radius)", [one, radius])
     for rate, column in ((found["touched"], "success"), (found["ended"], "final_success")):
         share = ours[column].mean()
         error = np.sqrt(2 * max(share * (1 - share), 1e-3) / 1000)

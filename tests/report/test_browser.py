@@ -187,6 +187,18 @@ def test_many_episodes_of_an_untrained_network_touch_often_and_end_seldom(visit)
     assert int(ended) < 6
 
 
+def test_arm_counts_a_touch_at_the_radius_that_it_is_given(visit):
+    page = visit(WIDE)
+    page.evaluate("""() => {
+      const place = document.getElementById("player"), all = place.cloneNode(true);
+      place.replaceWith(all);  // without the controls that the page gave it
+      const none = {gains: [0, 0, 3]}, words = {now: "", count: "{touched} {ended}"};
+      arm.mount(all, {policies: {untrained: none, none, controller: none}, radius: 0.5, words});
+    }""")
+    page.locator("[data-part=many]").click()
+    assert page.locator("[data-part=count]").text_content() == "100 % 100 %"
+
+
 def test_everything_can_be_read_without_scripts(visit):
     page = visit(WIDE, java_script_enabled=False)
     page.locator("#C1 summary").click()

@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -18,9 +19,11 @@ from reacher_shaping.analysis import learning_curves
 from reacher_shaping.analysis.baselines import peer_table
 from reacher_shaping.analysis.runs import LEARNED
 from reacher_shaping.report import captions, claims_view, html, paper_tables, pictures
+from reacher_shaping.report.quantities import in_words
 from reacher_shaping.report.summary import summary
 from reacher_shaping.report.text import entry
 from reacher_shaping.settings.study import load_study
+from reacher_shaping.storage.files import ArtifactError
 
 ROOT = Path(__file__).parents[2]
 LOADING = ("img", "script", "link", "iframe", "video", "source", "object", "embed", "audio")
@@ -235,10 +238,28 @@ def test_setup_is_read_from_the_settings(page, study, inputs):
     assert ["ppo: learning rate", "0.0003 (paper 3.2)"] in page.rows
     changed = {**study, "evaluation": {"episodes": 1234, "radius": 0.03}, "sources": {}}
     changed["protocols"] = {"paper": study["protocols"]["paper"] | {"ppo": {"learning_rate": 0.5}}}
-    other = Page(html.build(_changed(inputs, settings=changed)))
+    other = Page(html.build(_changed(inputs, settings=changed, policies=None)))
     assert any(row[0] == "ppo: learning rate" and row[1].startswith("0.5") for row in other.rows if len(row) > 1)
     assert "evaluated on 1,234 episodes" in other.text
     assert "within 30 mm of the target" in other.text
+
+
+def test_arm_is_drawn_and_counted_at_the_studys_radius(tmp_path, study, page, inputs):
+    wide = {**study, "evaluation": {"episodes": 1000, "radius": 0.05}}
+    built = html.build(report_inputs.make(tmp_path, wide, synthetic.TOY_GRID, 2))
+    circles = re.findall(r'class="goal"[^>]* r="([\d.]+)"', built)
+    assert len(circles) == 3  # the player's and one a path
+    assert {float(one) for one in circles} == {50}
+    assert '<rect class="band" x="0" y="87.5" width="300" height="12.5"/>' in built
+    assert json.loads(built.split('getElementById("player"), ')[1].split(");")[0])["radius"] == 0.05
+    with pytest.raises(ArtifactError, match=r"counts success at 0\.02 m, the study at 0\.05 m"):
+        html.build(_changed(inputs, settings=wide))
+
+
+def test_first_screen_leads_to_the_arm(inputs):
+    first = Page(html.build(inputs).split('id="short"')[1].split("</section>")[0])
+    assert "#arm" in first.links
+    assert "#arm" not in Page(html.build(_changed(inputs, policies=None))).links
 
 
 def test_toy_runs_are_marked(tmp_path, study, page):
@@ -346,6 +367,34 @@ def test_claims_show_two_verdicts_and_what_they_are_worth(inputs):
     assert "Changed because" in details["Tested here"][1]
     assert shown.measured == "\N{MINUS SIGN}2.0 [\N{MINUS SIGN}5.0, 1.0] points"
     assert 'aria-label="measured' in shown.picture
+
+
+UNITS = {"points": " points", "percent": " %", "times": " times", "plain": "", "whole": ""}
+
+
+def test_every_claim_says_where_the_paper_says_it_and_its_rule_in_the_unit_of_what_was_measured(inputs):
+    shown = claims_view.claims(inputs.study.ledger, inputs.study.tables)
+    ledger = {one["id"]: one for one in inputs.study.ledger}
+    assert len(shown) > 5
+    for claim in shown:
+        one = ledger[claim.name]
+        assert dict(claim.details)["The paper"] == [f"{in_words(one['evidence'])}."]
+        (_, grid), *_ = claim.parts
+        measured, holds = (grid.headings.index(name) for name in ("Measured [95 % interval]", "The claim holds"))
+        for row, part in zip(grid.rows, claims_view.newest(one)["rules"], strict=True):
+            unit = entry(f"estimates.{claim.name}")[part][1]
+            assert row[measured].endswith(UNITS[unit]) or row[measured] == claims_view.DASH
+            assert all(part.endswith(UNITS[unit]) for part in row[holds].split("; ")), (claim.name, row[holds])
+
+
+def test_claims_speak_of_shares_in_percent_and_of_their_differences_in_points():
+    plain = ("C4", "C10")  # of correlations
+    for claim in (claim for claim in synthetic.ledger() if claim["id"] not in plain):
+        assert re.search(r"Abstract|Section|Fig\.|Table|Appendix", claim["evidence"]), claim["id"]
+        words = [claim["claim"], claim["evidence"], claim.get("note", "")]
+        words += [test.get(name, "") for test in claim["tests"] for name in ("test", "reason")]
+        for text in words:
+            assert not re.search(r"(?<!= )(?<![\d.])0?\.\d+(?!\d)(?! %| points)", text), (claim["id"], text)
 
 
 def test_a_claim_row_says_that_the_other_study_was_not_run(page):

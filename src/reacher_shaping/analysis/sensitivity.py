@@ -25,7 +25,9 @@ def variations(study: Study, radii: pd.DataFrame | None) -> dict[str, Study]:
     mean_action = runs.assign(**{name: runs[f"deterministic_{name}"] for name in EVALUATION})
     found = {"mean action instead of samples": replace(study, runs=mean_action, untrained=None)}
     if radii is not None and len(radii):
-        found[f"radius {LARGER_RADIUS:g} m instead of 0.02"] = replace(study, runs=_at(runs, radii), untrained=None)
+        found[f"radius {1000 * LARGER_RADIUS:g} mm instead of 20"] = replace(
+            study, runs=_at(runs, radii), untrained=None
+        )
     seeds = sorted(runs["seed"].unique())
     if len(seeds) > FEW_SEEDS:
         for name, chosen in (("first", seeds[:FEW_SEEDS]), ("last", seeds[-FEW_SEEDS:])):

@@ -34,7 +34,7 @@ def measured(act: Actor, cell: Cell, *, mode: Mode, episodes: int, radius: float
     """What a policy of one run did: the shares of episodes that `touched` the target and that `ended` on it.
 
     `target` [x, y] and `path`, where the fingertip was at the start and after each step, `x,y x,y ...`, are of the
-    first, in mm.
+    first, in mm; `radius`, in m, is that of the success counted.
     """
     environment, root_seed = cell.protocol.environment, cell.root_seed
     rows = evaluate(act, [0], mode=mode, episodes=episodes, radius=radius, environment=environment, root_seed=root_seed)
@@ -42,6 +42,7 @@ def measured(act: Actor, cell: Cell, *, mode: Mode, episodes: int, radius: float
     path = controllers.tip_position(first.positions[:, :2])
     return {
         "episodes": episodes,
+        "radius": radius,
         "touched": float(rows["success"].mean()),
         "ended": float(rows["final_success"].mean()),
         "target": np.round(1000 * first.positions[0, 2:], 1).tolist(),

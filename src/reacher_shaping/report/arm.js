@@ -2,7 +2,7 @@
 // Lengths in m, angles in rad, time in s. A state is {q: [shoulder, elbow], v: their velocities, seen: the angles at
 // which MuJoCo measures the fingertip, those of the integrator's last stage}.
 const arm = (() => {
-  const LINKS = [0.1, 0.11], RADIUS = 0.02, STEPS = 50, SUBSTEPS = 2, DT = 0.01, GEAR = 200, ARMATURE = 1;
+  const LINKS = [0.1, 0.11], STEPS = 50, SUBSTEPS = 2, DT = 0.01, GEAR = 200, ARMATURE = 1;
   // Masses in kg and, about their centres, inertias in kg m^2 of the two links and the fingertip: reacher.xml's capsules
   // and sphere at MuJoCo's density of 1000 kg/m^3. Links' centres lie 0.05 m from their joint.
   const MASS = 0.03560472, INERTIA = 3.91756604e-5, TIP_MASS = 0.00418879, TIP_INERTIA = 1.675516e-7, CENTRE = 0.05;
@@ -123,23 +123,24 @@ const arm = (() => {
     }
     return {states, distances};
   };
-  const firstTouch = distances => distances.findIndex((one, t) => t > 0 && t <= STEPS && one <= RADIUS);
-  const rates = (policy, episodes, seed, sampled) => {
+  const firstTouch = (distances, radius) => distances.findIndex((one, t) => t > 0 && t <= STEPS && one <= radius);
+  const rates = (policy, episodes, seed, sampled, radius) => {
     const random = generator(seed);
     let touched = 0, ended = 0;
     for (let i = 0; i < episodes; i++) {
       const {distances} = episode(policy, reset(random), anyTarget(random), STEPS, sampled ? random : null);
-      touched += firstTouch(distances) > 0;
-      ended += distances[STEPS] <= RADIUS;
+      touched += firstTouch(distances, radius) > 0;
+      ended += distances[STEPS] <= radius;
     }
     return {touched: touched / episodes, ended: ended / episodes};
   };
   const policyOf = one => one.weights ? network(one.weights) : controller(...one.gains);
 
-  // The controls. `box` holds the drawing and the empty places; `given` the policies and the words with holes.
+  // The controls. `box` holds the drawing and the empty places; `given` the policies, the `radius` of success in
+  // m, and the words with holes.
   const mount = (box, given) => {
     const LONG = 150, FRAME = 50, SHOWN = 0.25; // steps an episode goes on at most, ms a step, m to the picture's edge
-    const part = name => box.querySelector(`[data-part="${name}"]`), words = given.words;
+    const part = name => box.querySelector(`[data-part="${name}"]`), words = given.words, radius = given.radius;
     const fill = (text, holes) => text.replace(/\{(\w+)\}/g, (_, name) => holes[name]);
     const percent = share => `${Math.round(100 * share)} %`, mm = metres => Math.round(1000 * metres);
     const policies = Object.fromEntries(Object.entries(given.policies).map(([name, one]) => [name, policyOf(one)]));
@@ -163,11 +164,11 @@ const arm = (() => {
       write("now", fill(words.now, {step: shown, distance: mm(run.distances[shown])}));
     };
     const tell = () => {
-      const first = firstTouch(run.distances.slice(0, shown + 1)), ended = run.distances[STEPS] <= RADIUS;
+      const first = firstTouch(run.distances.slice(0, shown + 1), radius), ended = run.distances[STEPS] <= radius;
       let text = shown ? (first > 0 ? fill(words.touched, {step: first}) : words.untouched) : words.start;
       if (shown >= STEPS) text += " " + fill(ended ? words.ended : words.missed, {distance: mm(run.distances[STEPS])});
       if (shown > STEPS) {
-        const later = run.distances.slice(STEPS + 1, shown + 1), held = later.filter(one => one <= RADIUS).length;
+        const later = run.distances.slice(STEPS + 1, shown + 1), held = later.filter(one => one <= radius).length;
         text += " " + fill(words.later, {steps: later.length, held: percent(held / later.length)});
       }
       write("said", text);
@@ -186,12 +187,12 @@ const arm = (() => {
       shown++;
       if (shown === STEPS) {
         count.episodes++;
-        count.touched += firstTouch(run.distances) > 0;
-        count.ended += run.distances[STEPS] <= RADIUS;
+        count.touched += firstTouch(run.distances, radius) > 0;
+        count.ended += run.distances[STEPS] <= radius;
         total();
       }
       draw();
-      if (shown % 10 === 0 || run.distances[shown] <= RADIUS) tell();
+      if (shown % 10 === 0 || run.distances[shown] <= radius) tell();
     };
     const prepare = () => {
       stop();
@@ -246,7 +247,7 @@ const arm = (() => {
       play();
     });
     part("many").addEventListener("click", () => {
-      const found = rates(policies[chosen()], 200, Math.floor(1e9 * random()), part("sampled").checked);
+      const found = rates(policies[chosen()], 200, Math.floor(1e9 * random()), part("sampled").checked, radius);
       count.episodes += 200;
       count.touched += 200 * found.touched;
       count.ended += 200 * found.ended;
@@ -255,5 +256,5 @@ const arm = (() => {
     box.hidden = false;
     prepare();
   };
-  return {STEPS, RADIUS, step, tip, distance, observe, network, controller, policyOf, act, episode, rates, generator, mount};
+  return {STEPS, step, tip, distance, observe, network, controller, policyOf, act, episode, rates, generator, mount};
 })();

@@ -108,7 +108,7 @@ def details(
     if "reason" in test:
         tested.append(say("claim.changed", reason=in_words(test["reason"])))
         tested.append(say("claim.earlier", dated=row["first_dated"], verdict=row["first_verdict"]))
-    parts = [("said", [f"{claim['evidence']}."] if claim.get("evidence") else []), ("tested", tested)]
+    parts = [("said", [f"{in_words(claim['evidence'])}."] if claim.get("evidence") else []), ("tested", tested)]
     parts.append(("note", [in_words(claim["note"])] if "note" in claim else []))
     parts.append(("worth", worth(row)))
     parts.append(
@@ -139,8 +139,7 @@ def worth(row: Row) -> list[str]:
 
 
 def _picture(row: Row, rule: Mapping[str, Any], unit: str) -> Markup:
-    value, low, high = (shown(float(row[name]), unit) for name in ("measured", "ci_low", "ci_high"))
-    label = say("claim.interval_of", value=value, low=low, high=high, rule=rule_text(rule, unit))
+    label = say("claim.interval_of", measured=with_interval(row, unit), rule=rule_text(rule, unit))
     numbers = small_pictures.Interval(*(float(row[name]) for name in ("measured", "ci_low", "ci_high", "published")))
     return small_pictures.interval(numbers, small_pictures.band(rule), label)
 

@@ -97,7 +97,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         for name, chart in interactive.charts(study.tables, inputs.protocol).items()
         if name in drawn
     }
-    played = arm.arm(inputs.policies)
+    played = arm.arm(inputs.policies, inputs.settings["evaluation"]["radius"])
     absent = {"further": not further, "rollouts": not videos, "arm": not played}
     sections = [name for name in entry("page.sections") if not absent.get(name, False)]
     return {

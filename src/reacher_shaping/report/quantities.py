@@ -35,18 +35,23 @@ def with_interval(row: Mapping[Any, Any], unit: str) -> str:
 
 def rule_text(rule: Mapping[str, Any], unit: str) -> str:
     """A rule of the ledger in words, its thresholds in the unit of the estimate."""
+
+    def limit(value: float) -> str:
+        return with_unit(shown(float(value), unit), unit)
+
     if "within" in rule:
-        low, high = (shown(float(limit), unit) for limit in rule["within"])
-        text = say("claim.rules.within", low=low, high=high)
+        low, high = rule["within"]
+        text = say("claim.rules.within", low=shown(float(low), unit), high=limit(high))
     else:
         side = "above" if "above" in rule else "below"
-        text = say(f"claim.rules.{side}", value=shown(float(rule[side]), unit))
+        text = say(f"claim.rules.{side}", value=limit(rule[side]))
     for name in ("refuted_below", "refuted_above"):
         if name in rule:
-            text = say(f"claim.rules.{name}", rule=text, value=shown(float(rule[name]), unit))
+            text = say(f"claim.rules.{name}", rule=text, value=limit(rule[name]))
     return text
 
 
 def in_words(text: str) -> str:
     """A sentence of the ledger with the variants' names as people read them."""
-    return _VARIANT.sub(lambda found: variant_label(found[1]), text).replace("`none`", "none").replace("alpha0", "α₀")
+    text = _VARIANT.sub(lambda found: variant_label(found[1]), text).replace("`none`", "none")
+    return text.replace("alpha0", "α₀").replace("alpha", "\N{GREEK SMALL LETTER ALPHA}")
