@@ -13,6 +13,7 @@ VARIANTS = {
     "cosine": Variant(name="cosine", potential="l2", schedule="cosine", horizon=300),
     "bilevel": Variant(name="bilevel", potential="l2", schedule="bilevel", rate=0.5),
     "success": Variant(name="success", potential="l2", schedule="success", rate=0.2),
+    "learned": Variant(name="learned", potential="learned", rate=0.3),
     "decay": Variant(name="decay", potential="l2", schedule="linear", horizon=3000),
 }
 

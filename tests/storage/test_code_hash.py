@@ -168,12 +168,26 @@ def copied(tmp_path, monkeypatch):
     [
         ("training/potentials.py", "\n\ndef l2sq", "\n\ndef exp(d):\n    return np.exp(-d)\n\n\ndef l2sq", set()),
         ("training/schedules.py", "\n\nconstant = ", "\n\nhalf = _stateless(lambda v, t: t)\nconstant = ", set()),
+        (
+            "training/schedules.py",
+            "\n\nconstant = ",
+            "\n\nslow = _stateless(lambda v, t: t / v.horizon)\nconstant = ",
+            set(),
+        ),
         ("tasks/other.py", "", "TASK = 1\n", set()),
         ("training/potentials.py", "np.negative(np.square(distance))", "-distance * distance", {"l2sq"}),
         ("training/schedules.py", "1.0 - env_steps", "2.0 - env_steps", {"decay"}),
         ("tasks/reacher.py", "frame_skip=2", "frame_skip=3", {"none", "l2", "l2sq", "decay"}),
     ],
-    ids=["potential_added", "schedule_added", "task_added", "potential", "schedule", "task"],
+    ids=[
+        "potential_added",
+        "schedule_added",
+        "schedule_of_a_horizon_added",
+        "task_added",
+        "potential",
+        "schedule",
+        "task",
+    ],
 )
 def test_a_cells_training_follows_its_own_potential_schedule_and_task(copied, file, old, new, changed):
     before = copied()
@@ -194,6 +208,20 @@ def test_the_names_that_settings_allow_are_those_of_the_code(copied):
     tracer._source.cache_clear()
     assert tracer.defined_names("training.potentials") == ("A", "c")
     assert set(tracer.modules_defining("tasks", "TASK")) == {*tasks, "toy"}
+
+
+def test_a_name_reads_what_its_own_code_or_what_it_calls_in_its_module_reads(copied):
+    lines = [
+        "def _a(v): return v.rate",
+        "def _b(v): return _a(v) + _b(v)",
+        "x = f(_b)",
+        "y = f(lambda v: v.other)",
+        "z = 1",
+    ]
+    (copied.folder / "training/potentials.py").write_text("\n".join(lines))
+    tracer._source.cache_clear()
+    assert tracer.names_reading("training.potentials", "rate") == ("x",)
+    assert tracer.names_reading("training.potentials", "other") == ("y",)
 
 
 def test_a_chosen_name_that_is_not_defined_is_refused(package):

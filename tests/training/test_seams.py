@@ -19,8 +19,8 @@ from reacher_shaping.tasks.base import Lanes
 from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training import schedules
 from reacher_shaping.training.alignment import alignment
+from reacher_shaping.training.records import Schedule
 from reacher_shaping.training.rollout import Collector, Plan
-from reacher_shaping.training.shaping import Schedule
 from reacher_shaping.training.train import _outputs, train
 
 FALLING = Schedule(
@@ -144,11 +144,12 @@ def test_the_success_schedule_is_one_less_the_moving_average_of_each_seeds_succe
     assert average.min() > 0
 
 
-@pytest.mark.parametrize("variant", ["success", "bilevel"])
-def test_an_adaptive_weight_survives_a_kill_with_the_same_bits_in_every_block(variant, tmp_path):
+@pytest.mark.parametrize("variant", ["success", "bilevel", "learned"])
+def test_what_adapts_survives_a_kill_with_the_same_bits_in_every_block(variant, tmp_path):
     cell = small(variant, alpha0=50.0, iterations=5)
     state = trained(cell, [0, 1], radius=0.15)
-    assert len(np.unique(state.progress["alpha"])) > 5, "the weights must move, each seed's its own way"
+    moving = state.shaping["knots"] if variant == "learned" else state.progress["alpha"]
+    assert len(np.unique(moving)) > 5, "it must move, each seed's its own way"
     path = tmp_path / "key" / "checkpoint.pt"
     save_checkpoint(path, trained(cell, [0, 1], radius=0.15, iterations=3))
     resumed = trained(cell, [0, 1], state=load_checkpoint(path)[0], radius=0.15)

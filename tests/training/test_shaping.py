@@ -9,6 +9,8 @@ from hypothesis.extra.numpy import arrays
 
 from reacher_shaping.settings.cell import PPO, Cell, Protocol, Shaping, Variant
 from reacher_shaping.training.advantage import gae, next_values
+from reacher_shaping.training.potentials import learned
+from reacher_shaping.training.records import Transitions
 from reacher_shaping.training.shaping import Rule
 
 STEPS = 50
@@ -213,3 +215,52 @@ def test_heuristic_guided_learning_is_temporal_difference_towards_the_guess_wher
 def test_one_discount_for_all_runs_is_refused_with_a_weight_for_each():
     with pytest.raises(ValueError, match=r"form = 'hurl'.*schedule = 'success'"):
         rule(VARIANTS["success"], form="hurl")
+
+
+KNOTS = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64]
+
+
+@given(arrays(np.float64, 8, elements=st.floats(-10, 10)), arrays(np.float64, 20, elements=st.floats(0, 1)))
+def test_a_learned_potential_is_a_line_between_its_knots_and_constant_beyond(values, distance):
+    phi = learned.value({"knots": values[None]}, distance[None])[0]
+    np.testing.assert_allclose(phi, np.interp(distance, KNOTS, values), atol=1e-12)
+
+
+def test_a_learned_potential_moves_by_the_mean_temporal_difference_near_each_knot():
+    """A loop over two steps of one seed by hand; the other seed, whose numbers are no numbers, changes nothing."""
+    before, after, reward = [0.01, 0.06], [0.06, 0.0], [1.0, 2.0]
+    phi = dict(zip(KNOTS, range(8), strict=True)) | {0.06: 3.5}
+    first, second = (r + 0.9 * phi[b] - phi[a] for a, b, r in zip(before, after, reward, strict=True))
+    expected = np.arange(8.0)
+    expected[1] += 0.3 * first
+    expected[3] += 0.3 * second
+    expected[4] += 0.3 * second
+    steps = Transitions(
+        *(np.array([row, [np.nan, 0.1]]) for row in (before, after, reward)),
+        discount=0.9,
+    )
+    state = learned.update(VARIANTS["learned"], {"knots": np.tile(np.arange(8.0), (2, 1))}, steps)
+    np.testing.assert_allclose(state["knots"][0], expected, rtol=1e-14)
+
+
+def test_a_learned_potential_becomes_the_value_of_a_task_that_the_distance_tells_whole():
+    """A walk over the knots towards the goal, where a reward of 1 is had for ever: gamma^k / (1 - gamma) at k steps."""
+    knots = np.array(KNOTS)
+    steps = Transitions(knots[None], np.array([[KNOTS[0], *KNOTS[:-1]]]), (knots == 0)[None].astype(float), 0.9)
+    state = learned.start(1)
+    assert not state["knots"].any()
+    for _ in range(1000):
+        state = learned.update(VARIANTS["learned"], state, steps)
+    np.testing.assert_allclose(state["knots"][0], 0.9 ** np.arange(8) * 10, rtol=1e-6)
+
+
+def test_a_learned_potential_shapes_as_one_that_is_given():
+    """With the knots on a line through 0 it is a multiple of the distance."""
+    distance = np.random.default_rng(0).uniform(0, 0.6, (1, 2, 5))
+    ends = np.array([[False] * 3 + [True]] * 2)
+    given_one, learned_one = (rule(VARIANTS[name], alpha0=5.0, terminal_potential="zero") for name in ("l2", "learned"))
+    steps = np.arange(8).reshape(2, 4)
+    terms = learned_one.reward(distance, steps, ends, {"knots": -np.array([KNOTS])})
+    np.testing.assert_allclose(terms, given_one.reward(distance, steps, ends, {}), atol=1e-14)
+    assert learned_one.learns
+    assert not given_one.learns

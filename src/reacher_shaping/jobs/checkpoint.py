@@ -34,7 +34,7 @@ def save_checkpoint(path: Path, state: TrainState, seconds: tuple[float, float] 
         "progress": {name: torch.from_numpy(values) for name, values in state.progress.items()},
         "episode_returns": torch.from_numpy(state.episode_returns),
         "plan": [state.plan.steps, state.plan.episode_steps],
-        "schedule": {name: torch.from_numpy(values) for name, values in state.schedule.items()},
+        "shaping": {name: torch.from_numpy(values) for name, values in state.shaping.items()},
         "unlogged": torch.from_numpy(state.unlogged),
         "seconds": list(seconds),
     }
@@ -62,7 +62,7 @@ def load_checkpoint(path: Path) -> tuple[TrainState, tuple[float, float]]:
             progress={name: values.numpy() for name, values in content["progress"].items()},
             episode_returns=content["episode_returns"].numpy(),
             plan=Plan(*content["plan"]),
-            schedule={name: values.numpy() for name, values in content["schedule"].items()},
+            shaping={name: values.numpy() for name, values in content["shaping"].items()},
             unlogged=content["unlogged"].numpy(),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:

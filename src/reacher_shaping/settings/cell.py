@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from reacher_shaping.settings.base import WHOLE, Count, Fraction, Name, NonNegative, Positive, Seed, Settings, plain
-from reacher_shaping.storage.code_hash import defined_names, modules_defining
+from reacher_shaping.storage.code_hash import defined_names, modules_defining, names_reading
 
 Alpha0 = Annotated[float, Field(ge=1e-6, le=1e6)]
 """The shaping weight at t = 0, without unit; bounded because it names the cell's folder in plain digits."""
@@ -27,10 +27,10 @@ else:  # what there is, read from the code without running it
     ScheduleName = Literal[defined_names("training.schedules")]
 
 
-DECAYING = ("linear", "exponential", "cosine")
-"""Schedules of a horizon."""
-ADAPTIVE = ("success", "bilevel")
-"""Schedules of a rate."""
+SCHEDULES_OF = {name: names_reading("training.schedules", name) for name in ("horizon", "rate")}
+"""Schedules that need a setting of the variant: those whose code reads it."""
+LEARNED = names_reading("training.potentials", "rate")
+"""Potentials that are learned, by a rate."""
 
 
 class Environment(Settings):
@@ -171,18 +171,20 @@ class Variant(Settings):
     horizon: Count | None = None
     """Environment steps until a decay is at 0, or at 1 / e where it is exponential."""
     rate: Annotated[float, Field(gt=0, le=1)] | None = None
-    """How far an adaptive weight moves in an iteration."""
+    """How far an adaptive weight, or a learned potential, moves in an iteration."""
 
     @model_validator(mode="after")
     def _schedule_is_complete(self) -> Self:
-        needs = {"horizon": self.schedule in DECAYING, "rate": self.schedule in ADAPTIVE}
+        schedule, potential = f"schedule = {self.schedule!r}", f"potential = {self.potential!r}"
+        needs = {name: [schedule] * (self.schedule in names) for name, names in SCHEDULES_OF.items()}
+        needs["rate"] += [potential] * (self.potential in LEARNED)
         units = {"horizon": "a number of environment steps >= 1", "rate": "a number in (0, 1]"}
         for name, needed in needs.items():
             value = getattr(self, name)
             if needed and value is None:
-                raise ValueError(f"{name} is missing; schedule = {self.schedule!r} needs {units[name]}")
+                raise ValueError(f"{name} is missing; {needed[0]} needs {units[name]}")
             if not needed and value is not None:
-                raise ValueError(f"{name} = {value} has no meaning with schedule = {self.schedule!r}; leave it out")
+                raise ValueError(f"{name} = {value} has no meaning with {schedule}; leave it out")
         if (self.name == "none") != (self.potential == "none"):
             raise ValueError(
                 f"potential = {self.potential!r} does not go with the name {self.name!r}: "
@@ -215,7 +217,7 @@ class Cell(Settings):
             )
         if self.variant.potential == "none" and self.alpha0 != 1 and self.protocol.shaping.start_weight == "alpha0":
             raise ValueError(f"alpha0 = {self.alpha0} has no meaning with variant '{self.variant.name}'; allowed: 1")
-        if self.protocol.shaping.form == "hurl" and self.variant.schedule in ADAPTIVE:
+        if self.protocol.shaping.form == "hurl" and self.variant.schedule in SCHEDULES_OF["rate"]:
             raise ValueError(
                 f"shaping.form = 'hurl' has one discount for all runs, and schedule = {self.variant.schedule!r} a "
                 "weight for each; allowed: a schedule that depends on the steps alone"

@@ -80,6 +80,20 @@ def modules_defining(folder: str, name: str) -> tuple[str, ...]:
     return tuple(module for module in modules if name in _source(f"{folder}.{module}").definitions)
 
 
+def names_reading(module: str, attribute: str) -> tuple[str, ...]:
+    """Names that a module defines, without an underscore, whose own code or what it calls there reads an attribute."""
+    source = _source(module)
+
+    def reads(name: str, seen: frozenset[str] = frozenset()) -> bool:
+        nodes = source.definitions[name]
+        if any(isinstance(part, ast.Attribute) and part.attr == attribute for node in nodes for part in ast.walk(node)):
+            return True
+        used = {found for node in nodes for where, found in source.references(node, module) if where == module}
+        return any(reads(other, seen | {name}) for other in used - seen - {name})
+
+    return tuple(name for name in defined_names(module) if reads(name))
+
+
 class _Source:
     """One parsed file: its definitions by name (statements that define none under ""), its imports of the package."""
 

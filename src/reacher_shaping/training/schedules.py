@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from reacher_shaping.settings.cell import Variant
-from reacher_shaping.training.shaping import Array, Schedule, State
+from reacher_shaping.training.records import Array, Schedule, State
 
 _RANGE = (1e-3, 10.0)
 """Shares of alpha0 that an aligned weight stays within."""

@@ -6,34 +6,22 @@ r'(s, a, s', t) = r + alpha(t) (gamma Phi(s') - Phi(s))    (paper, section 3.4)
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reacher_shaping.settings.cell import Cell, Shaping, Variant
-
-Array = NDArray[np.float64]
-Potential = Callable[[Array], Array]
-State = dict[str, Array]
-"""What a schedule keeps, by name; each with the seeds [S] as first axis."""
+from reacher_shaping.training.records import Array, Potential, Schedule, State
 
 
-class Schedule(NamedTuple):
-    """A share of alpha0 that depends on the steps of training, and perhaps on how each seed fares.
-
-    Attributes:
-        start: the state before the first iteration, of a number of seeds S; empty where there is nothing to keep.
-        weight: (variant, state, environment steps of training done [...]) -> share of alpha0, [...] or [S, ...].
-        update: (variant, state, measures of the iteration by name, [S] each) -> the state of the next iteration.
-            No number of one seed may meet one of another.
-        aligned: whether the measures shall hold `alignment`, see `training.alignment`.
-    """
-
-    start: Callable[[int], State]
-    weight: Callable[[Variant, State, Array], Array]
-    update: Callable[[Variant, State, Mapping[str, Array]], State]
-    aligned: bool = False
+def fixed(function: Callable[[Array], Array]) -> Potential:
+    """Return a potential that learns nothing as the record of one."""
+    return Potential(
+        start=lambda seeds: {},
+        value=lambda state, distance: function(distance),
+        update=lambda variant, state, steps: {},
+    )
 
 
 @dataclass(frozen=True)
@@ -41,9 +29,9 @@ class Rule:
     """The shaping of a cell.
 
     Attributes:
-        potential: Phi of distances to the goal (any shape, m).
+        potential: Phi of distances to the goal.
         schedule: of the weight.
-        variant: the schedule's settings.
+        variant: the settings of both.
         alpha0: weight where the schedule gives 1.
         discount: gamma.
         settings: `form` "paper" is alpha(t) (gamma Phi' - Phi); "dynamic" is gamma alpha(t+1) Phi' -
@@ -71,9 +59,24 @@ class Rule:
         """
         settings = cell.protocol.shaping
         potential = getattr(import_module("reacher_shaping.training.potentials"), cell.potential)
+        potential = potential if isinstance(potential, Potential) else fixed(potential)
         schedule = getattr(import_module("reacher_shaping.training.schedules"), cell.variant.schedule)
         alpha0 = 1.0 if settings.start_weight == "one" else cell.alpha0
         return cls(potential, schedule, cell.variant, alpha0, cell.protocol.ppo.discount, settings)
+
+    def start(self, seeds: int) -> State:
+        """Return the state of schedule and potential before the first iteration."""
+        return {**self.schedule.start(seeds), **self.potential.start(seeds)}
+
+    @property
+    def learns(self) -> bool:
+        """Whether the potential has a state, and so needs the steps of an iteration."""
+        return bool(self.potential.start(1))
+
+    def update(self, state: State, measured: Mapping[str, Any]) -> State:
+        """Return the state of the next iteration from the measures of this one, its `transitions` where it learns."""
+        learned = self.potential.update(self.variant, state, measured["transitions"]) if self.learns else {}
+        return {**self.schedule.update(self.variant, state, measured), **learned}
 
     def alpha(self, state: State, env_steps: ArrayLike) -> Array:
         """Return the shaping weight after `env_steps` environment steps of training [...]: [...] or [S, ...]."""
@@ -96,9 +99,9 @@ class Rule:
             distance: [S, L, T+1] m, to the goal in s_0 .. s_T.
             env_steps: [L, T] environment steps of training done before each step: t of alpha(t).
             ends: [L, T] true at a lane's last step, where the episode (or the rollout) is cut.
-            state: the schedule's.
+            state: of schedule and potential.
         """
-        phi = self.potential(np.asarray(distance, dtype=np.float64))
+        phi = self.potential.value(state, np.asarray(distance, dtype=np.float64))
         before, after = phi[..., :-1], phi[..., 1:]
         if self.settings.terminal_potential == "zero" and self.settings.episode_end == "terminal":
             after = np.where(ends, 0.0, after)

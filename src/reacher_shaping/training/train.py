@@ -22,8 +22,9 @@ from reacher_shaping.training import advantage, ppo
 from reacher_shaping.training.alignment import alignment
 from reacher_shaping.training.network import Shape, silent
 from reacher_shaping.training.policy import Policy, initialise, inputs
+from reacher_shaping.training.records import State, Transitions
 from reacher_shaping.training.rollout import Collector, Plan, Rollout
-from reacher_shaping.training.shaping import Rule, State
+from reacher_shaping.training.shaping import Rule
 
 Array = NDArray[np.float64]
 Rows = dict[str, NDArray[Any]]
@@ -46,7 +47,7 @@ class TrainState:
         progress: [S, I] of each of `MEASURES`, NaN from `iteration` on.
         episode_returns: [S, I, E] unshaped returns of the episodes that reached the time limit.
         plan: how an iteration's environment steps lie in episodes.
-        schedule: the state of the shaping weight's schedule.
+        shaping: the state of the shaping's weight and potential.
         unlogged: [S] shaped return of the last rollout's steps after its last whole episode.
         iteration: iterations done.
     """
@@ -58,7 +59,7 @@ class TrainState:
     progress: Rows
     episode_returns: Array
     plan: Plan
-    schedule: State
+    shaping: State
     unlogged: Array
     iteration: int = 0
 
@@ -77,7 +78,7 @@ class TrainState:
             progress={name: np.full(logged, np.nan) for name in MEASURES},
             episode_returns=np.full((*logged, plan.episodes), np.nan),
             plan=plan,
-            schedule=Rule.of(cell).schedule.start(len(seeds)),
+            shaping=Rule.of(cell).start(len(seeds)),
             unlogged=np.zeros(len(seeds)),
         )
 
@@ -150,7 +151,7 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
             **summary,
             "action_std": np.exp(policy.layers.log_std.numpy()).mean((1, 2)),
             **losses._asdict(),
-            "alpha": rule.alpha(state.schedule, state.iteration * state.plan.steps),
+            "alpha": rule.alpha(state.shaping, state.iteration * state.plan.steps),
         }
         shaped, rest = measured.pop("shaped_returns"), measured.pop("rest")
         state.episode_returns[:, state.iteration] = measured.pop("episode_returns")
@@ -159,7 +160,7 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
         else:
             measured["logged_return"] = measured["episode_return"]
         state.unlogged = rest
-        state.schedule = rule.schedule.update(cell.variant, state.schedule, measured)
+        state.shaping = rule.update(state.shaping, measured)
         for name, values in state.progress.items():
             values[:, state.iteration] = measured[name]
         state.iteration += 1
@@ -194,18 +195,18 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
 
 def prepare(
     cell: Cell, task: Task, rule: Rule, state: TrainState, rollout: Rollout, radius: float
-) -> tuple[NDArray[np.float32], Rows]:
+) -> tuple[NDArray[np.float32], dict[str, Any]]:
     """Turn a rollout into sample records [S, N, F + A + 4] and the rollout's summary, [S] each.
 
     Samples stand in the order of the sequential rollout. The summary also holds `episode_returns`
     [S, E], unshaped, `shaped_returns` [S, E], and `rest` [S], the shaped return of the steps after the last
-    whole episode; and `alignment` [S] where the schedule asks for it.
+    whole episode; `alignment` [S] where the schedule asks for it, and `transitions` where the potential learns.
     """
     settings, plan, environment = cell.protocol.ppo, state.plan, cell.protocol.environment
     reward = task.rewards[environment.reward](
         rollout.measured[..., 1:, :], rollout.control, control_weight=environment.control_weight, success_radius=radius
     )
-    extra = rule.reward(rollout.distance, plan.order + state.iteration * plan.steps, plan.ends, state.schedule)
+    extra = rule.reward(rollout.distance, plan.order + state.iteration * plan.steps, plan.ends, state.shaping)
     features, log_prob, values = _outputs(state.policy(), rollout)
     following = advantage.next_values(values, plan.ends, cell.protocol.shaping.episode_end)
     advantages = advantage.gae(
@@ -213,7 +214,7 @@ def prepare(
         values[..., :-1],
         following,
         plan.ends,
-        discount=rule.discount_at(state.schedule, state.iteration * plan.steps),
+        discount=rule.discount_at(state.shaping, state.iteration * plan.steps),
         gae_lambda=settings.gae_lambda,
     )
     advantages, fitted = plan.sequence(advantages), plan.sequence(values[..., :-1])
@@ -225,10 +226,15 @@ def prepare(
         advantage.normalise(advantages),
         targets,
     )
-    summary = _summary(reward, extra, rollout, plan, radius) | {"explained_variance": _explained(fitted, targets)}
+    summary: dict[str, Any] = _summary(reward, extra, rollout, plan, radius) | {
+        "explained_variance": _explained(fitted, targets)
+    }
     if rule.schedule.aligned:
         acted = (features, rollout.action, log_prob)
         summary["alignment"] = alignment(state.policy(), *acted, reward, extra, plan, settings)
+    if rule.learns:
+        before, after = plan.sequence(rollout.distance[..., :-1]), plan.sequence(rollout.distance[..., 1:])
+        summary["transitions"] = Transitions(before, after, plan.sequence(reward), settings.discount)
     return records, summary
 
 
