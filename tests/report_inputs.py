@@ -51,6 +51,17 @@ def curves(grid):
     )
 
 
+def seed_curves(grid, seeds):
+    """Three iterations of every run: its return is minus its seed."""
+    rows = [
+        dict(zip(KEY, cell, strict=True), seed=seed, iteration=at, env_steps=2048 * at, episode_return=-float(seed))
+        for cell in grid
+        for seed in range(seeds)
+        for at in (1, 4, 7)
+    ]
+    return pd.DataFrame(rows)
+
+
 def radii(grid):
     """Success of every cell at three radii, the radius in units of 0.05 m; a tenth of it at the last step."""
     made = [
@@ -89,7 +100,7 @@ def make(folder, study, grid, seeds, **changes):
         "comparisons": comparisons.comparison_frame(runs), "peers": synthetic.peers(),
         "winners": single_seed_studies.winners_frame(studies), "spread": single_seed_studies.spread_frame(studies),
         "claims": synthetic.claims(), "claim_parts": synthetic.claim_parts(), "scores": scores_frame(runs),
-        "curves": curves(grid), "radii": radii(grid),
+        "curves": curves(grid), "seed_curves": seed_curves(grid, seeds), "radii": radii(grid),
     }  # fmt: skip
     kept = changes.pop("only", tables)
     tables = {name: table for name, table in tables.items() if name in kept}

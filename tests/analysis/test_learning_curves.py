@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+import synthetic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reacher_shaping.analysis import learning_curves
+from reacher_shaping.labels import KEY
 
 
 def test_moving_average_trails():
@@ -85,6 +87,19 @@ def test_steps_to_threshold_is_the_first_time_and_nan_if_never():
     found = learning_curves.steps_to_threshold(np.concatenate([curve, curve - 100]), steps, -20.5)
     assert found[0] == 2048 * 35  # iterations 26 to 35 average -20.5
     assert np.isnan(found[1])
+
+
+def test_single_seeds_have_the_mean_that_is_drawn_and_no_value_where_a_run_is_lost():
+    progress = synthetic.progress([("paper", variant, 50_000, 1.0) for variant in ("none", "l2")], 3)
+    lost = progress.index[(progress["seed"] == 1) & (progress["iteration"] == 1)]
+    progress.loc[lost, "episode_return"] = np.inf
+    seeds, means = learning_curves.seed_curves(progress), learning_curves.curve_table(progress)
+    key = [*KEY, "iteration"]
+    ours = seeds.groupby(key)["episode_return"].mean()
+    drawn = means.set_index(key)["episode_return"].loc[ours.index]
+    assert len(seeds) == 3 * len(ours)
+    assert seeds["episode_return"].isna().sum() == len(lost)
+    np.testing.assert_allclose(ours, drawn, atol=0.005)
 
 
 def test_diverged_curve_has_no_measures_and_leaves_the_others_alone():

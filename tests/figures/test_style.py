@@ -1,18 +1,23 @@
 """A figure looks the same on every machine, to every reader, and in every file."""
 
 import itertools
+import json
 import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
+import report_inputs
 import synthetic
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
-from reacher_shaping.figures import paper
+from reacher_shaping.figures import interactive, paper, parts
 from reacher_shaping.figures.style import LOOKS, SPARE_COLORS, save, to_bytes, variant_color
+from reacher_shaping.labels import variant_label, variant_order
 
 DRAW = """
 import sys
@@ -116,8 +121,33 @@ def _lab(color, seen=DEUTERANOPIA):
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
-def test_variants_are_told_apart_under_deuteranopia_by_colour_or_dashes():
-    for one, other in itertools.combinations(LOOKS.values(), 2):
-        apart = np.linalg.norm(_lab(one.color) - _lab(other.color))
-        assert one.marker != other.marker
-        assert apart > 15 or one.dashes != other.dashes, (one, other)
+def _unlike(one, other):
+    """Whether two patterns of dashes are told apart at a glance: other strokes, or a period longer by half."""
+    if len(one) != len(other):
+        return True
+    return bool(one) and max(sum(one), sum(other)) > 1.5 * min(sum(one), sum(other))
+
+
+def test_lines_of_a_figure_are_told_apart_under_deuteranopia_by_colour_or_dashes():
+    """Over what is drawn: every variant that has a look, one that has none, and `none` as a borrowed line."""
+    names = [*LOOKS, "a variant of somebody's"]
+    assert len({one.marker for one in LOOKS.values()}) == len(LOOKS)
+    frame = pd.DataFrame([{"variant": name, "x": x, "y": x, "low": x, "high": x} for name in names for x in (0, 1)])
+    frame = pd.concat([frame.assign(borrowed=False), frame[frame["variant"] == "none"].assign(borrowed=True)])
+    (axes,) = parts.lines(Figure(), frame, "x", "y", {}, {})
+    lines = [(line.get_color(), line._unscaled_dash_pattern[1] or ()) for line in axes.lines]
+    assert len(lines) == len(names) + 1
+    for (color, dashes), (other, more) in itertools.combinations(lines, 2):
+        apart = np.linalg.norm(_lab(color) - _lab(other))
+        assert apart > 15 or _unlike(dashes, more), (color, dashes, other, more, apart)
+
+
+def test_chart_of_the_page_draws_each_variant_in_its_colour_and_dashes():
+    frame = report_inputs.curves(synthetic.PAPER_GRID)
+    chart = json.loads(interactive.learning_curves(frame).to_json())
+    lines = next(layer["encoding"] for layer in chart["layer"] if layer["mark"]["type"] == "line")
+    names = sorted(set(frame["variant"]), key=variant_order)
+    assert len(names) > 6
+    looks = {"color": [LOOKS[name].color for name in names], "strokeDash": [list(LOOKS[name].dashes) for name in names]}
+    for channel, scale in looks.items():
+        assert lines[channel]["scale"] == {"domain": [variant_label(name) for name in names], "range": scale}

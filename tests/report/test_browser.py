@@ -146,6 +146,19 @@ def test_curves_tell_their_values_and_are_switched_in_the_legend(visit):
     page.wait_for_function("document.querySelectorAll('#figure_1 .mark-symbol.role-mark path').length === 1")
 
 
+def test_single_seeds_are_switched_on_beside_the_mean(visit):
+    page = visit(WIDE)
+    chart = opened_chart(page, "figure_1")
+    thin = chart.locator(".mark-line.role-mark path[stroke-width='1']")
+    assert thin.count() == 0
+    counts = {}
+    for choice in ("seed 1", "every seed"):
+        chart.locator("select", has_text="mean alone").select_option(label=choice.removeprefix("seed "))
+        page.wait_for_timeout(300)
+        counts[choice] = thin.count()
+    assert counts == {"seed 1": 6, "every seed": 18}  # of six variants of the first setting, three seeds each
+
+
 def test_success_is_shown_at_the_radius_of_the_slider_and_the_step_asked_for(visit):
     page = visit(PHONE)
     chart = opened_chart(page, "success_by_radius")

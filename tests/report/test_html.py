@@ -256,6 +256,13 @@ def test_arm_is_drawn_and_counted_at_the_studys_radius(tmp_path, study, page, in
         html.build(_changed(inputs, settings=wide))
 
 
+def test_page_says_that_a_run_keeps_no_curves_of_single_seeds(page, inputs):
+    assert "Curves of single seeds cannot be switched on" not in page.text
+    assert (
+        "Curves of single seeds cannot be switched on" in Page(html.build(_changed(inputs, {"seed_curves": None}))).text
+    )
+
+
 def test_first_screen_leads_to_the_arm(inputs):
     first = Page(html.build(inputs).split('id="short"')[1].split("</section>")[0])
     assert "#arm" in first.links

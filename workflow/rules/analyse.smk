@@ -1,6 +1,7 @@
 # From the blocks' tables to the study's: runs, cells, learning curves, correlations, claims.
 TABLES = [f"results/{entry.file}" for entry in STUDY_TABLES.values() if entry.always]
 RUN_RADII = f"results/{STUDY_TABLES['run_radii'].file}"
+SEED_CURVES = f"results/{STUDY_TABLES['seed_curves'].file}"
 BLOCK_CELLS = block_cells(MAIN)
 ASKED = asked_of_blocks(STUDY.cells, STUDY.seeds)
 PUBLISHED = {

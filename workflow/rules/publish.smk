@@ -11,6 +11,7 @@ rule build_crate:
             ),
             TABLES,
             RUN_RADII,
+            SEED_CURVES,
             FIGURES,
             FORMATTED_TABLES,
             NOTEBOOKS,

@@ -60,6 +60,20 @@ def curve_table(progress: pd.DataFrame, confidence: float = 0.95, column: str = 
     return curves.merge(design, on=KEY, validate="many_to_one").sort_values(keys, ignore_index=True)
 
 
+EVERY = 3
+"""Every third iteration of a run is enough to look at, and a third of the rows."""
+
+
+def seed_curves(progress: pd.DataFrame) -> pd.DataFrame:
+    """Each run's own curve, every third iteration: the cell's key, `seed, iteration, env_steps, episode_return`.
+
+    `progress` as for `curve_table`; returns to two decimals, missing where not finite.
+    """
+    columns = [*KEY, "seed", "iteration", "env_steps", "episode_return"]
+    shown = progress.loc[progress["iteration"] % EVERY == 1, columns].replace([np.inf, -np.inf], np.nan)
+    return shown.round({"episode_return": 2}).sort_values(columns[:-2], ignore_index=True)
+
+
 WINDOW = 20
 BURN_IN = 0.2
 WINDOWS = (1, 5, 10, 20, 40)

@@ -3,6 +3,7 @@
 Each stands beside a figure that shows the same without JavaScript.
 """
 
+import inspect
 from collections.abc import Callable, Mapping
 from functools import cache
 
@@ -10,12 +11,13 @@ import altair as alt
 import pandas as pd
 import vl_convert
 
-from reacher_shaping.figures.style import variant_color
+from reacher_shaping.analysis.learning_curves import EVERY
+from reacher_shaping.figures.style import variant_look
 from reacher_shaping.labels import cell_order, of_protocol, setting_label, settings_of, variant_label, variant_order
 
 Chart = alt.LayerChart | alt.FacetChart
-EVERY = 3
-"""Every third iteration of a curve is enough for a screen."""
+MEAN, ALL = "mean alone", "every seed"
+"""What the reader may choose instead of a seed."""
 DRAW = """
 // A chart is drawn when it is opened. `ast`: its expressions are interpreted, so that a page may forbid `eval`.
 for (const spec of document.querySelectorAll("script[data-chart]")) {
@@ -42,17 +44,22 @@ def code() -> str:
 def charts(tables: Mapping[str, pd.DataFrame], protocol: str | None = None) -> dict[str, str]:
     """Return the specifications by the figure that each stands beside, as JSON that may stand within HTML.
 
-    Only those are there whose table is. `protocol` is the one shown; None takes the first.
+    Only those are there whose tables are. `protocol` is the one shown; None takes the first.
     """
-    return {
-        figure: draw(of_protocol(tables[table], protocol)).to_json(indent=None).replace("</", "<\\/")
-        for figure, (table, draw) in CHARTS.items()
-        if table in tables and len(tables[table])
-    }
+    found = {}
+    for figure, draw in CHARTS.items():
+        asked = inspect.signature(draw).parameters
+        given = {name: of_protocol(tables[name], protocol) for name in asked if name in tables and len(tables[name])}
+        if all(name in given or asked[name].default is None for name in asked):
+            found[figure] = draw(**given).to_json(indent=None).replace("</", "<\\/")
+    return found
 
 
-def learning_curves(curves: pd.DataFrame) -> Chart:
-    """Learning curves: choose budget and weight, click variants on and off, read values under the pointer."""
+def learning_curves(curves: pd.DataFrame, seed_curves: pd.DataFrame | None = None) -> Chart:
+    """Learning curves: choose budget and weight, click variants on and off, read values under the pointer.
+
+    With `seed_curves` (`learning_curves.seed_curves`) single seeds can be shown beside the means.
+    """
     ours = _named(curves).dropna(subset="episode_return")
     ours = ours[ours["iteration"] % EVERY == 1]
     settings = [setting_label(*setting) for setting in settings_of(ours)]
@@ -65,7 +72,7 @@ def learning_curves(curves: pd.DataFrame) -> Chart:
         .transform_filter("datum.setting == setting")
         .encode(
             alt.X("env_steps:Q", title="Environment steps", axis=alt.Axis(format="~s")),
-            _colors(ours, legend=alt.Legend(symbolOpacity=1)),
+            **_looks(ours, alt.Legend(symbolOpacity=1, symbolType="stroke", symbolStrokeWidth=2)),
         )
     )
     value = alt.Y("episode_return:Q", title="Episode return, unshaped", scale=alt.Scale(zero=False))
@@ -79,10 +86,44 @@ def learning_curves(curves: pd.DataFrame) -> Chart:
     line = base.mark_line().encode(value, opacity=on.then(alt.value(1)).otherwise(alt.value(0.06)))
     points = base.transform_filter(picked).mark_point(filled=True, size=70)
     points = points.encode(value, tooltip=tips, opacity=pointed.then(alt.value(1)).otherwise(alt.value(0)))
-    layers = alt.layer(band, line.add_params(picked, setting), points.add_params(near))
-    return layers.properties(
+    layers = [band, line.add_params(picked, setting), points.add_params(near)]
+    if seed_curves is not None:
+        layers.insert(1, _single_seeds(seed_curves, ours, on))
+    return alt.layer(*layers).properties(
         width="container", height=320, description="Learning curves; click a variant in the legend to show it alone."
     )
+
+
+def _single_seeds(seed_curves: pd.DataFrame, means: pd.DataFrame, on: alt.When) -> alt.Chart:
+    """A thin line per run, none of them until the reader chooses; a run's values are one text, a tenth of the size."""
+    runs = []
+    for (variant, setting, seed), own in _named(seed_curves).groupby(["variant", "setting", "seed"], sort=False):
+        own = own.dropna(subset="episode_return")
+        if len(own) < 2:
+            continue
+        first, second = own["env_steps"].iloc[:2]
+        values = " ".join(f"{value:.1f}" for value in own["episode_return"])
+        runs.append([variant, setting, str(seed), first, second - first, values])
+    frame = pd.DataFrame(runs, columns=["variant", "setting", "seed", "first", "step", "curve"])
+    order = sorted(set(frame["seed"]), key=int)
+    seeds = alt.param("seeds", value=MEAN, bind=alt.binding_select(options=[MEAN, ALL, *order], name="Seeds "))
+    shown = (
+        alt.Chart(_data(frame))
+        .transform_filter(f"datum.setting == setting && (seeds == '{ALL}' || datum.seed == seeds)")
+        .transform_calculate(value="split(datum.curve, ' ')", place="sequence(length(split(datum.curve, ' ')))")
+        .transform_flatten(["value", "place"])
+        .transform_calculate(value="toNumber(datum.value)", env_steps="datum.first + datum.step * datum.place")
+    )
+    tips = [alt.Tooltip("variant:N"), alt.Tooltip("seed:N")]
+    lines = shown.mark_line(strokeWidth=1).encode(
+        alt.X("env_steps:Q"),
+        alt.Y("value:Q"),
+        **_looks(means, None),
+        detail="seed:N",
+        tooltip=tips,
+        opacity=on.then(alt.value(0.7)).otherwise(alt.value(0)),
+    )
+    return lines.add_params(seeds)
 
 
 def success_at_radius(radii: pd.DataFrame) -> Chart:
@@ -103,7 +144,7 @@ def success_at_radius(radii: pd.DataFrame) -> Chart:
     base = (
         alt.Chart(_data(shown.round(4)))
         .transform_filter("abs(datum.millimetres - radius) < 0.01 && datum.kind == kind")
-        .encode(alt.Y("cell:N", sort=list(dict.fromkeys(ours["cell"])), title=None), _colors(ours, legend=None))
+        .encode(alt.Y("cell:N", sort=list(dict.fromkeys(ours["cell"])), title=None), _looks(ours, None)["color"])
     )
     scale, axis = alt.Scale(domain=[0, 1]), alt.Axis(format=".0%", title="Success rate")
     tips = [alt.Tooltip("cell:N"), *(alt.Tooltip(f"{name}:Q", format=".1%") for name in ("success", "low", "high"))]
@@ -114,11 +155,8 @@ def success_at_radius(radii: pd.DataFrame) -> Chart:
     )
 
 
-CHARTS: dict[str, tuple[str, Callable[[pd.DataFrame], Chart]]] = {
-    "figure_1": ("curves", learning_curves),
-    "success_by_radius": ("radii", success_at_radius),
-}
-"""Table and chart, by the figure that it stands beside."""
+CHARTS: dict[str, Callable[..., Chart]] = {"figure_1": learning_curves, "success_by_radius": success_at_radius}
+"""The chart that stands beside a figure; its parameters are tables, and those with a default may be missing."""
 
 
 def _named(frame: pd.DataFrame) -> pd.DataFrame:
@@ -129,11 +167,16 @@ def _named(frame: pd.DataFrame) -> pd.DataFrame:
     return ordered.assign(setting=settings, key=ordered["variant"], variant=ordered["variant"].map(variant_label))
 
 
-def _colors(frame: pd.DataFrame, legend: alt.Legend | None) -> alt.Color:
-    """Return every variant's own colour."""
+def _looks(frame: pd.DataFrame, legend: alt.Legend | None) -> dict[str, alt.Color | alt.StrokeDash]:
+    """Return every variant's own colour and dashes, `color` and `strokeDash`, told in one legend."""
     keys = sorted(set(frame["key"]), key=variant_order)
-    scale = alt.Scale(domain=[variant_label(key) for key in keys], range=[variant_color(key) for key in keys])
-    return alt.Color("variant:N", scale=scale, title=None, legend=legend)
+    labels, looks = [variant_label(key) for key in keys], [variant_look(key) for key in keys]
+    colors = alt.Scale(domain=labels, range=[one.color for one in looks])
+    dashes = alt.Scale(domain=labels, range=[list(one.dashes) for one in looks])
+    return {
+        "color": alt.Color("variant:N", scale=colors, title=None, legend=legend),
+        "strokeDash": alt.StrokeDash("variant:N", scale=dashes, title=None, legend=legend),
+    }
 
 
 def _data(frame: pd.DataFrame) -> alt.InlineData:

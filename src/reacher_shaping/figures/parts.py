@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from reacher_shaping.figures.style import BAND, PUBLISHED, QUIET, STYLE, millimetres, percent, variant_look
+from reacher_shaping.figures.style import BAND, BORROWED, PUBLISHED, QUIET, STYLE, millimetres, percent, variant_look
 from reacher_shaping.labels import setting_label, variant_label, variant_order
 
 DOT: dict[str, Any] = {"marker": "o", "pointsize": 5.5, "edgecolor": "white", "edgewidth": 0.6, "linewidth": 0}
@@ -67,7 +67,7 @@ def lines(
     borrowed = frame["borrowed"] if "borrowed" in frame else pd.Series(False, frame.index)
     frame = frame.assign(dashes=frame["variant"].where(~borrowed, "borrowed"))
     scales = looks(frame["variant"])
-    scales["linestyle"] |= {"borrowed": (4, 2)}
+    scales["linestyle"] |= {"borrowed": BORROWED}
     plot = so.Plot(frame, x=x, y=y, color="variant", linestyle="dashes").facet(**panels).share(**share)
     plot = plot.add(so.Band(alpha=0.07 if marked else 0.14), ymin="low", ymax="high", legend=False)
     markers = {"marker": "variant"} if marked else {}

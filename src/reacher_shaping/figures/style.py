@@ -2,7 +2,8 @@
 
 A variant keeps its look in every figure. The base hues are those of Okabe and Ito (2008), told apart under the common
 colour-vision deficiencies; a decayed variant with the L2-squared potential takes the darker shade of its horizon's hue
-and dashes of its own, since the three darker shades are not.
+and dashes of its own, since the three darker shades are not. So does a variant that the paper does not have, where its
+hue is near another's.
 """
 
 import io
@@ -42,8 +43,16 @@ LOOKS = {
     "decay200k_l2sq": Look("#00573F", (5, 1.5), "<"),
     "decay300k_l2sq": Look("#863B00", (4, 1.2, 1, 1.2), ">"),
     "decay500k_l2sq": Look("#7D3459", (1, 1), "X"),
+    "success": Look("#332288", marker="*"),
+    "bilevel": Look("#56B4E9", marker="p"),
+    "exponential100k": Look("#B8A100", (3, 1), "h"),
+    "cosine300k": Look("#44AA99", (7, 1.5, 1, 1.5, 1, 1.5), "8"),
+    "decay120k": Look("#999933", (10, 2, 2, 2), "H"),
 }
 SPARE_COLORS = ("#56B4E9", "#999933", "#882255", "#44AA99", "#332288", "#B8A100")
+SPARE_DASHES = (5, 1, 1, 1, 1, 1, 1, 1)
+BORROWED = (9, 3)
+"""Dashes of a curve that stands beside others for comparison alone."""
 INK, QUIET, BAND = "#333333", "#555555", "#F3F5F7"
 """Text, helping lines and explanations, the ground behind every second group of rows."""
 PUBLISHED: dict[str, Any] = {"marker": "D", "color": "black", "markeredgecolor": "white", "markersize": 6}
@@ -102,7 +111,8 @@ def look() -> Iterator[None]:
 
 def variant_look(variant: str) -> Look:
     """The look of a variant; one that the paper does not have gets a fixed spare colour."""
-    return LOOKS.get(variant, Look(SPARE_COLORS[zlib.crc32(variant.encode()) % len(SPARE_COLORS)]))
+    spare = SPARE_COLORS[zlib.crc32(variant.encode()) % len(SPARE_COLORS)]
+    return LOOKS.get(variant, Look(spare, SPARE_DASHES, "d"))
 
 
 def variant_color(variant: str) -> str:

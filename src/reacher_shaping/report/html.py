@@ -123,6 +123,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         "grid": study_grid(cells),
         "pictures": drawn,
         "charts": charts,
+        "chart_notes": {} if "seed_curves" in study.tables else {"figure_1": say("page.charts_no_seeds")},
         "charts_code": Markup(interactive.code()) if charts else "",
         "further": further,
         "experiments": [

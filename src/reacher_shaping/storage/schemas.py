@@ -17,6 +17,10 @@ CURVES = Table(
     | {"seeds": INTEGER, **_DESIGN},
     optional=frozenset({"episode_return", "low", "high"}) | _HORIZON,
 )
+SEED_CURVES = Table(
+    {**_CELL, "seed": INTEGER, "iteration": INTEGER, "env_steps": INTEGER, "episode_return": NUMBER},
+    optional=frozenset({"episode_return"}),
+)
 _NUMBERS = {"published", "measured", "ci_low", "ci_high", "replication", "power", "refuted_if_true"}
 _WORTH = {"dated": TEXT, "replication": NUMBER, "interval_verdict": TEXT, "seeds_to_decide": NUMBER}
 _WORTH |= {"family_verdict": TEXT, "power": NUMBER, "refuted_if_true": NUMBER, "published_holds": NUMBER}

@@ -81,6 +81,14 @@ STUDY_TABLES = {
         ("check_results", "format_tables", "plot_figures", *REPORT),
     ),
     "curves": Entry(*_AGGREGATED["curves"], "aggregate_runs", ("plot_figures", *REPORT)),
+    "seed_curves": Entry(
+        "seed_curves.parquet",
+        schemas.SEED_CURVES,
+        "a run and every third training iteration",
+        "aggregate_runs",
+        REPORT,
+        always=False,
+    ),
     "correlation": Entry(
         "correlation.csv",
         schemas.CORRELATION,
