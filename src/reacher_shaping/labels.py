@@ -56,7 +56,7 @@ def number(value: float, digits: int) -> str:
         mantissa, _, power = f"{value:.1e}".partition("e+")
         text = f"{mantissa} \N{MULTIPLICATION SIGN} 10{str(int(power)).translate(_SUPERSCRIPTS)}" if power else mantissa
     else:
-        text = f"{value:.{digits}f}"
+        text = f"{round(value, digits) + 0.0:.{digits}f}"  # without a sign where nothing is left of the number
     return text.replace("-", "\N{MINUS SIGN}")
 
 

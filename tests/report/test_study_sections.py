@@ -10,6 +10,8 @@ import synthetic
 from switched import LOGS, peers
 
 from reacher_shaping.analysis.baselines import agreement_frame
+from reacher_shaping.figures.studies import switch_label
+from reacher_shaping.labels import number
 from reacher_shaping.report import paper_tables, study_sections, study_tables
 from reacher_shaping.storage.reference import read_studies
 
@@ -70,10 +72,18 @@ def test_section_lists_our_logs_and_then_the_published_one(section):
     assert len(rows) == 8 + 1
 
 
+def test_caption_of_logs_promises_published_runs_only_where_they_are(released):
+    sections = (study_sections.section("mine", released, logs) for logs in (LOGS, LOGS.assign(protocol="other")))
+    told = [next(name for name in each.grids if "own log" in name) for each in sections]
+    assert [text.endswith("Below, published runs of the same cells") for text in told] == [True, False]
+
+
 def test_section_of_switches_names_the_largest_effect_and_the_interactions(released, effects):
     given = {**released, "effects": effects}
     text = " ".join(study_sections.section("attribution", given, LOGS).sentences)
-    assert "success, any step: a: epochs 10 to 5 (none, as the last one, to the end), 20.0 [20.0, 20.0] points" in text
+    assert (
+        "success at any step: a: epochs 10 to 5 (none, as the last one, to the end), 20.0 [20.0, 20.0] points" in text
+    )
     assert "depends on the others beyond chance for a (success" in text
     weak = effects.assign(p_holm=0.06)
     assert "No switch's effect depends on the others beyond chance." in study_sections.effects_sentence(weak)
@@ -82,7 +92,7 @@ def test_section_of_switches_names_the_largest_effect_and_the_interactions(relea
 def test_the_largest_effect_may_be_a_loss(effects):
     first = (effects["effect"] == "alone") & (effects["switch"] == "b") & (effects["metric"] == "success_rate")
     moved = effects.assign(difference=np.where(first, -0.7, effects["difference"]))
-    assert "success, any step: b: discount 0.99 to 0.5 (none, alone" in study_sections.effects_sentence(moved)
+    assert "success at any step: b: discount 0.99 to 0.5 (none, alone" in study_sections.effects_sentence(moved)
 
 
 def test_best_cell_is_the_one_with_the_highest_success(released):
@@ -111,8 +121,8 @@ def test_section_says_whether_a_peer_differs(released):
     assert same.endswith(f" [{low}, {high}] points.")
     apart = study_sections.agreement_sentence(agreement_frame(ours, peers(0.5)))
     assert apart.startswith("1 of 8 measures differ")
-    assert apart.endswith("success, any step.")
-    assert "to its PPO in success, any step is" in same
+    assert apart.endswith("success at any step.")
+    assert "to its PPO in success at any step is" in same
     alone = agreement_frame(ours, peers(seeds=1))
     assert study_sections.agreement_sentence(alone).endswith("cannot be told (8 seeds beside 1).")
     uncorrected = agreement_frame(ours, peers()).assign(p=1e-9)
@@ -127,7 +137,7 @@ def test_section_counts_the_differences_that_survive_holm(released):
     assert alone == "With one seed no difference between shaped cells and none can be told from chance."
     text = study_sections.shaping_sentence(shaped)
     assert "distance at the last step in 5 of 5 (5 for the better)" in text
-    assert "success, any step in 0 of 5," in text
+    assert "success at any step in 0 of 5," in text
 
 
 def test_section_corrects_over_the_measures_of_the_only_shaped_cell(released):
@@ -135,7 +145,7 @@ def test_section_corrects_over_the_measures_of_the_only_shaped_cell(released):
     shaped = shaped[shaped["family"] == "none"].groupby("metric").head(1)
     shaped = shaped.assign(seeds=10, p=0.5, p_holm=0.001, difference=-0.01, ci_low=-0.02, ci_high=0.01)
     nothing = study_sections.shaping_sentence(shaped)
-    assert "(Holm over the measures, 5 %): nothing. Not to be told from chance: success, any step" in nothing
+    assert "(Holm over the measures, 5 %): nothing. Not to be told from chance: success at any step" in nothing
     shaped.loc[shaped["metric"] == "final_distance", "p"] = 0.009  # 5 times as much once corrected: below 5 %
     shaped.loc[shaped["metric"] == "mean_return", "p"] = 0.015  # 4 times as much: above
     changed, chance = study_sections.shaping_sentence(shaped).split("Not to be told from chance")
@@ -154,7 +164,7 @@ def test_two_protocols_of_one_shaped_cell_are_no_only_cell(released):
     assert shaped["protocol"].nunique() == 2
     losses = np.where(shaped["protocol"] == "released", 0.1, -0.1)
     text = study_sections.shaping_sentence(shaped.assign(seeds=10, p_holm=0.01, difference=losses))
-    assert "success, any step in 2 of 2 (1 for the better)" in text
+    assert "success at any step in 2 of 2 (1 for the better)" in text
 
 
 def test_document_holds_every_table_and_figure(released):
@@ -175,6 +185,21 @@ def test_unknown_experiment_has_a_section_too(released):
     assert section.grids
 
 
+def test_switch_that_is_named_as_its_setting_is_said_once():
+    row = {"switch": "discount", "setting": "discount 0.99 to 0.954"}
+    assert switch_label(row) == "discount 0.99 to 0.954"
+    assert switch_label(row | {"switch": "d1"}) == "D1: discount 0.99 to 0.954"
+
+
+def test_nothing_is_shown_without_a_minus_sign():
+    assert (number(-0.04, 1), number(-0.06, 1), number(0.0, 2)) == ("0.0", "\N{MINUS SIGN}0.1", "0.00")
+
+
+def test_question_of_a_study_ends_as_a_sentence(released):
+    for question, told in (("What", "What."), ("Why?", "Why?"), ("So.", "So."), ("", "")):
+        assert study_sections.section("mine", released, LOGS, words={"question": question}).intro == told
+
+
 def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
     row = {"id": "S1", "claim": "c", "a": "p l2 50", "b": "p none 1", "mean_a": 0.5, "mean_b": 0.01, "difference": 0.49}
     row |= {"ci_low": 0.3, "ci_high": 0.6, "p_holm": 0.009, "solved_a": 0.8, "solved_b": 0.0, "verdict": "supported"}
@@ -182,14 +207,15 @@ def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
     table = pd.DataFrame([row, row | {"id": "S2", "verdict": "open"}])
     grid = study_tables.hypotheses(table)
     assert len(grid.headings) == len(grid.rows[0])
-    assert grid.rows[0][2:4] == ["p l2 50: 0.500", "p none 1: 0.010"]
+    assert grid.rows[0][2:5] == ["p, L2, α₀ = 50: 50.0 %", "p, none: 1.0 %", "49.0 [30.0, 60.0]"]
+    assert grid.rows[0][6] == "8 and 0 of 10"
     assert [row[-1] for row in grid.rows] == ["supported", "open"]
     counted, opened, told = study_sections.hypotheses_sentences(table)
     assert counted == ("Of 2 hypotheses written down before the runs, 1 are supported, 0 contradicted and 1 stay open.")
     assert "none is excluded" in opened
     assert "“c”, is supported" in told
     assert "differs by 49.0 [30.0, 60.0] points (p 0.009 " in told
-    assert "8 of 10 runs solve the task with p l2 50, 0 with p none 1." in told
+    assert "8 of 10 runs solve the task with p, L2, α₀ = 50, 0 with p, none." in told
     assert "between 2.0 and 60.0 %" in told
     decided = study_sections.hypotheses_sentences(table.assign(verdict="supported"))
     assert not [text for text in decided if "none is excluded" in text]

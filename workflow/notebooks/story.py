@@ -35,6 +35,8 @@ from reacher_shaping.report import captions, claims_view, paper_tables
 from reacher_shaping.report.loader import load
 from reacher_shaping.report.summary import summary, to_markdown
 from reacher_shaping.report.text import say
+from reacher_shaping.report.text_tables import study_grid
+from reacher_shaping.report.text_tables import to_markdown as to_table
 
 study = load(results, published)
 cells, runs, curves = (study.tables[name] for name in ("cells", "runs", "curves"))
@@ -50,7 +52,7 @@ Markdown(to_markdown(summary(study, protocol)))
 
 # %%
 ours = cells[cells["protocol"] == protocol]
-ours.pivot(index="variant", columns=["budget", "alpha0"], values="seeds").astype("Int64").rename_axis(index="seeds of")
+Markdown(to_table(study_grid(ours)))
 
 # %% [markdown]
 # ## How training goes

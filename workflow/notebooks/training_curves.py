@@ -56,4 +56,4 @@ Markdown(captions.caption("figure_4", cells, protocol=protocol))
 # %%
 curves = curves[curves["protocol"] == protocol].dropna(subset="episode_return")
 highest = curves.groupby(CELL)["episode_return"].idxmax()
-curves.loc[highest, [*CELL, "iteration", "episode_return", "low", "high"]].reset_index(drop=True)
+curves.loc[highest, [*CELL, "iteration", "episode_return", "low", "high"]].round(2).reset_index(drop=True)

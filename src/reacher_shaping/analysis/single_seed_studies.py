@@ -42,8 +42,8 @@ STATEMENTS: dict[str, Callable[[Array], NDArray[np.bool_]]] = {
     ),
     "alpha0 = 0.5 is lower than 1 on average": lambda s: s[:, HALF].mean(axis=1) < s[:, FULL].mean(axis=1),
     "l2 gains from 500K to 1M while l2sq declines": lambda s: (_gain(s, "l2") > 0) & (_gain(s, "l2sq") < 0),
-    "the five best cells are above 0.20": lambda s: np.sort(s, axis=1)[:, -5] > 0.2,
-    "`none` hardly changes (0.02) from 500K to 1M": lambda s: np.abs(_gain(s, "none")) <= 0.02,
+    "the five best cells are above 20 %": lambda s: np.sort(s, axis=1)[:, -5] > 0.2,
+    "`none` hardly changes (2 points) from 500K to 1M": lambda s: np.abs(_gain(s, "none")) <= 0.02,
 }
 
 

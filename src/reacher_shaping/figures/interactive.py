@@ -72,7 +72,7 @@ def learning_curves(curves: pd.DataFrame, seed_curves: pd.DataFrame | None = Non
         .transform_filter("datum.setting == setting")
         .encode(
             alt.X("env_steps:Q", title="Environment steps", axis=alt.Axis(format="~s")),
-            **_looks(ours, alt.Legend(symbolOpacity=1, symbolType="stroke", symbolStrokeWidth=2)),
+            *_looks(ours, alt.Legend(symbolOpacity=1, symbolType="stroke", symbolStrokeWidth=2)),
         )
     )
     value = alt.Y("episode_return:Q", title="Episode return, unshaped", scale=alt.Scale(zero=False))
@@ -115,10 +115,10 @@ def _single_seeds(seed_curves: pd.DataFrame, means: pd.DataFrame, on: alt.When) 
         .transform_calculate(value="toNumber(datum.value)", env_steps="datum.first + datum.step * datum.place")
     )
     tips = [alt.Tooltip("variant:N"), alt.Tooltip("seed:N")]
-    lines = shown.mark_line(strokeWidth=1).encode(
+    lines: alt.Chart = shown.mark_line(strokeWidth=1).encode(
         alt.X("env_steps:Q"),
         alt.Y("value:Q"),
-        **_looks(means, None),
+        *_looks(means, None),
         detail="seed:N",
         tooltip=tips,
         opacity=on.then(alt.value(0.7)).otherwise(alt.value(0)),
@@ -144,7 +144,7 @@ def success_at_radius(radii: pd.DataFrame) -> Chart:
     base = (
         alt.Chart(_data(shown.round(4)))
         .transform_filter("abs(datum.millimetres - radius) < 0.01 && datum.kind == kind")
-        .encode(alt.Y("cell:N", sort=list(dict.fromkeys(ours["cell"])), title=None), _looks(ours, None)["color"])
+        .encode(alt.Y("cell:N", sort=list(dict.fromkeys(ours["cell"])), title=None), _looks(ours, None)[0])
     )
     scale, axis = alt.Scale(domain=[0, 1]), alt.Axis(format=".0%", title="Success rate")
     tips = [alt.Tooltip("cell:N"), *(alt.Tooltip(f"{name}:Q", format=".1%") for name in ("success", "low", "high"))]
@@ -167,16 +167,16 @@ def _named(frame: pd.DataFrame) -> pd.DataFrame:
     return ordered.assign(setting=settings, key=ordered["variant"], variant=ordered["variant"].map(variant_label))
 
 
-def _looks(frame: pd.DataFrame, legend: alt.Legend | None) -> dict[str, alt.Color | alt.StrokeDash]:
-    """Return every variant's own colour and dashes, `color` and `strokeDash`, told in one legend."""
+def _looks(frame: pd.DataFrame, legend: alt.Legend | None) -> tuple[alt.Color, alt.StrokeDash]:
+    """Return every variant's own colour and dashes, told in one legend."""
     keys = sorted(set(frame["key"]), key=variant_order)
     labels, looks = [variant_label(key) for key in keys], [variant_look(key) for key in keys]
     colors = alt.Scale(domain=labels, range=[one.color for one in looks])
     dashes = alt.Scale(domain=labels, range=[list(one.dashes) for one in looks])
-    return {
-        "color": alt.Color("variant:N", scale=colors, title=None, legend=legend),
-        "strokeDash": alt.StrokeDash("variant:N", scale=dashes, title=None, legend=legend),
-    }
+    return (
+        alt.Color("variant:N", scale=colors, title=None, legend=legend),
+        alt.StrokeDash("variant:N", scale=dashes, title=None, legend=legend),
+    )
 
 
 def _data(frame: pd.DataFrame) -> alt.InlineData:

@@ -254,7 +254,7 @@ def lottery(lottery: pd.DataFrame) -> Figure:
     plot = so.Plot(shown, x="share", y="statement", text="text").add(so.Bar(color="#0072B2", alpha=1, width=0.65))
     (axes,) = parts.draw(plot.add(so.Text(color="black", fontsize=8, halign="left", offset=4)), figure)
     axes.tick_params(axis="y", length=0)
-    axes.set(xlim=(0, 1.08), xlabel="Share of single-seed studies in which it comes out", ylabel="")
+    axes.set(xlim=(0, 1.15), xlabel="Share of single-seed studies in which it comes out", ylabel="")
     percent(axes.xaxis)
     return figure
 

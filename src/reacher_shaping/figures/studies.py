@@ -27,12 +27,12 @@ from reacher_shaping.labels import KEY, cell_order, setting_label, stochastic, v
 from reacher_shaping.settings.outputs import DOSES
 
 STRIP = {
-    "success_rate": "Success, any step",
-    "final_success_rate": "Success, last step",
+    "success_rate": "Success at any step",
+    "final_success_rate": "Success at the last step",
     "mean_return": "Mean return",
 }
 EFFECT_LABELS = {
-    "success_rate": "Change of: success rate, any step",
+    "success_rate": "Change of: success rate at any step",
     "unit_return": "Change of: mean return at control weight 1",
     "final_distance": "Change of: distance at the last step (mm)",
 }
@@ -48,10 +48,11 @@ def protocol_label(name: str) -> str:
 
 
 def switch_label(row: Mapping[Any, Any]) -> str:
-    """A switch and, under it, what it sets."""
+    """A switch and, under it, what it sets; the setting alone where it bears the switch's name."""
     if row["switch"] == "all":
         return "all switches"
-    return f"{protocol_label(str(row['switch']))}: {row['setting']}"
+    name = protocol_label(str(row["switch"]))
+    return str(row["setting"]) if str(row["setting"]).startswith(f"{name} ") else f"{name}: {row['setting']}"
 
 
 @look()
@@ -102,7 +103,8 @@ def dose(runs: pd.DataFrame, cells: pd.DataFrame) -> Figure:
     over_runs = {"data": means, "x": "weight", "y": name, "col": "protocol"}
     plot = plot.add(so.Range(color="black"), ymin=f"{name}_low", ymax=f"{name}_high", **over_runs)
     plot = plot.add(so.Dot(marker="D", color="black", pointsize=6), **over_runs)
-    plot = plot.scale(x=so.Nominal(order=order)).limit(y=(-0.03, 1.03)).label(x="", y="Success, last step", col="")
+    plot = plot.scale(x=so.Nominal(order=order)).limit(y=(-0.03, 1.03))
+    plot = plot.label(x="", y="Success at the last step", col="")
     for axes, protocol in zip(parts.draw(plot, figure), protocols, strict=True):
         axes.set_title(protocol_label(protocol))
         axes.set_xlabel("Weight α₀")

@@ -26,6 +26,8 @@ def facts(cells: pd.DataFrame, manifests: Manifests, settings_hash: str, protoco
     if days:
         name = "page.date" if days[0] == days[-1] else "page.dates"
         found.append(say(name, first=days[0], last=days[-1]))
+    elif manifests:
+        found.append(say("page.undated"))
     commits = list(dict.fromkeys(_commit(row.get("git", {})) for row in manifests))
     found += [say("page.commit", commit=", ".join(commits))] if commits else []
     return [*found, say("page.settings", hash=settings_hash[:12])] if settings_hash else found

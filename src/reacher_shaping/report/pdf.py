@@ -17,7 +17,7 @@ from reacher_shaping.report.html import RELEASED, Inputs, headed
 from reacher_shaping.report.markup import to_typst
 from reacher_shaping.report.summary import summary
 from reacher_shaping.report.text import entry, say
-from reacher_shaping.report.text_tables import Grid, controllers_grid, of_table
+from reacher_shaping.report.text_tables import Grid, controllers_grid, of_table, study_grid
 
 TEMPLATE = Path(__file__).with_name("report.typ")
 Part = dict[str, Any]
@@ -58,6 +58,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     return {
         "title": say("page.title"),
         "facts": " · ".join(computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol)),
+        "toy": computation.toy(cells),
         "lead": to_typst(first.lead),
         "answers": [vars(answer) for answer in first.answers],
         "counts": first.counts,
@@ -120,8 +121,12 @@ def _claims(inputs: Inputs) -> list[Part]:
 def _method(inputs: Inputs) -> list[Part]:
     evaluation = inputs.settings["evaluation"]
     radius = f"{1000 * evaluation['radius']:g}"
+    cells = of_protocol(inputs.study.tables["cells"], inputs.protocol)
+    meanings = [f"*{word}*: {meaning.format(radius=radius)}" for word, meaning in entry("page.words").items()]
     parts = [
         _text(say("page.setup")),
+        _table(study_grid(cells), say("page.setup_caption")),
+        _list(meanings),
         _text(say("page.evaluation", episodes=f"{evaluation['episodes']:,}", radius=radius)),
     ]
     parts.append(_text(say("pdf.method")))

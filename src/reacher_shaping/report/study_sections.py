@@ -17,8 +17,9 @@ from reacher_shaping.analysis.target_maps import SQUARE
 from reacher_shaping.figures import drawing
 from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.figures.style import to_bytes
-from reacher_shaping.labels import setting_label, variant_label
+from reacher_shaping.labels import KEY, setting_label, variant_label
 from reacher_shaping.report import study_tables, text_tables
+from reacher_shaping.report.quantities import in_words
 from reacher_shaping.report.study_tables import METRICS, SHAPING, decimals, interval, p_value
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid
@@ -79,7 +80,10 @@ def section(
         if published is not None:
             found[say("study_tables.beside")] = study_tables.beside(given["cells"], published)
     if "log" in shown:
-        found[say("study_tables.logs", window=WINDOW)] = study_tables.logs(given["logs"], training_logs)
+        logs = study_tables.logs(given["logs"], training_logs)
+        told = say("study_tables.logs", window=WINDOW)
+        beside = len(logs.rows) > len(given["logs"].drop_duplicates(KEY))
+        found[say("study_tables.logs_published", caption=told) if beside else told] = logs
     if "agreement" in given:
         said.append(agreement_sentence(given["agreement"]))
         found[say("study_tables.agreement")] = study_tables.agreement(given["agreement"])
@@ -91,7 +95,9 @@ def section(
     found[say("study_tables.cells")] = study_tables.cells(given["cells"])
     words = {"title": protocol_label(name).capitalize(), "question": "", **(words or {})}
     figures = [f"{name}_{view}" for view in shown]
-    return Section(name, words["title"], words["question"], [text for text in said if text], found, figures, first)
+    question = words["question"]
+    question += "" if question.endswith((".", "?")) or not question else "."
+    return Section(name, words["title"], question, [text for text in said if text], found, figures, first)
 
 
 def document(
@@ -154,13 +160,13 @@ def hypotheses_sentences(table: pd.DataFrame) -> list[str]:
     shown |= {end: f"{100 * row[f'{end}_a']:.1f}" for end in ("least", "greatest")}
     told = say(
         "study_sentences.hypothesis",
-        claim=row["claim"].rstrip("."),
+        claim=in_words(row["claim"]).rstrip("."),
         verdict=row["verdict"],
         difference=interval(row, "difference", "ci_low", "ci_high", 1, 100.0),
         p=p_value(row["p_holm"]),
         runs=f"{row['runs']:.0f}",
-        a=row["a"],
-        b=row["b"],
+        a=study_tables.hypothesis_cell(row["a"]),
+        b=study_tables.hypothesis_cell(row["b"]),
         **shown,
     )
     return [*texts, told]

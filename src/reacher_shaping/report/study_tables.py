@@ -17,6 +17,7 @@ from reacher_shaping.labels import (
     variant_label,
 )
 from reacher_shaping.report import paper_tables
+from reacher_shaping.report.quantities import in_words
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid, of_table
 
@@ -79,14 +80,22 @@ def lengths(table: pd.DataFrame) -> Grid:
     return Grid(list(entry("tables.lengths")), rows, frozenset({0, 1, 2}))
 
 
+def hypothesis_cell(name: str) -> str:
+    """`sparse20 l2 50`, as the table of hypotheses names a cell, as people read it."""
+    protocol, variant, alpha0 = name.split(" ")
+    weight = [] if variant == "none" else [f"α₀ = {alpha0}"]
+    return ", ".join([protocol_label(protocol), variant_label(variant), *weight])
+
+
 def hypotheses(table: pd.DataFrame) -> Grid:
     """A row per hypothesis: what it says, both cells, their difference with interval and p, and the verdict."""
     rows = []
     for row in table.to_dict("records"):
-        means = [f"{row[side]}: {number(row[f'mean_{side}'], 3)}" for side in ("a", "b")]
-        solved = " / ".join(number(row[f"solved_{side}"], 1) for side in ("a", "b"))
-        apart = interval(row, "difference", "ci_low", "ci_high", 3)
-        rows.append([row["id"], row["claim"], *means, apart, p_value(row["p_holm"]), solved, row["verdict"]])
+        means = [f"{hypothesis_cell(row[side])}: {number(100 * row[f'mean_{side}'], 1)} %" for side in ("a", "b")]
+        counts = {f"solved_{side}": round(row[f"solved_{side}"] * row["runs"]) for side in ("a", "b")}
+        solved = say("study_sentences.solved", **counts, runs=f"{row['runs']:.0f}")
+        apart = interval(row, "difference", "ci_low", "ci_high", 1, 100.0)
+        rows.append([row["id"], in_words(row["claim"]), *means, apart, p_value(row["p_holm"]), solved, row["verdict"]])
     return Grid(list(entry("tables.hypotheses")), rows, frozenset({0, 1, 2, 3, 7}))
 
 
