@@ -40,6 +40,12 @@ def test_cells_are_listed_with_what_is_there_of_them(project, tmp_path):
         shutil.move(tmp_path / "block", project.folder / BLOCK)
 
 
+def test_a_part_of_the_study_that_is_done_is_asked_for_again_without_a_word_of_progress(project):
+    done = project.snakemake("--until", "evaluate_block")
+    assert done.returncode == 0, done.stderr
+    assert "left" not in done.stderr
+
+
 def test_cells_of_other_settings_or_code_are_told(project, toy_settings):
     first, second = toy_settings["grid"]
     with project.configured(grid=[first | {"ppo": {"learning_rate": 0.001}}, second]):

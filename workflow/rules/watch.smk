@@ -17,6 +17,8 @@ def watch():
             handler.addFilter(is_news)
     rates = cost.measured_rates(Path("results"), HERE / "report/reference/manifest.json")
     jobs = [job for job in workflow.dag.needrun_jobs() if not job.is_norun]
+    if not jobs:  # `--until` with nothing left to do comes here too
+        return
     at_a_time = min(len(jobs), workflow.cores if workflow.local_exec else workflow.nodes)
     seconds = {job: expected_seconds(job.rule.name, job.wildcards_dict, rates) for job in jobs}
     progress = study_progress.StudyProgress(seconds, at_a_time)
