@@ -39,6 +39,13 @@ def test_rates_are_those_of_the_blocks_that_are_there(tmp_path):
     rates = cost.measured_rates(tmp_path / "results", tmp_path / "none.json")
     assert (rates.training, rates.evaluation) == (pytest.approx(3072), pytest.approx(2000))
     assert "the 1 blocks in" in rates.source
+    assert rates.start == cost.Rates().start, "nothing tells"
+    benchmark = tmp_path / "results/benchmarks/test/l2/4000/alpha1/seeds0-2/train.tsv"
+    benchmark.parent.mkdir(parents=True)
+    benchmark.write_text("s\th:m:s\tmax_rss\n5.50\t0:00:05\t300.1\n")
+    assert cost.measured_rates(tmp_path / "results", tmp_path / "none.json").start == pytest.approx(1.5)
+    benchmark.write_text("s\th:m:s\tmax_rss\n1.00\t0:00:01\t300.1\n")  # its record counts the job before it too
+    assert cost.measured_rates(tmp_path / "results", tmp_path / "none.json").start == cost.Rates().start
 
 
 def test_without_blocks_the_reference_run_tells_and_without_that_a_guess(tmp_path):

@@ -40,8 +40,8 @@ def test_cells_are_listed_with_what_is_there_of_them(project, tmp_path):
         shutil.move(tmp_path / "block", project.folder / BLOCK)
 
 
-def test_a_part_of_the_study_that_is_done_is_asked_for_again_without_a_word_of_progress(project):
-    done = project.snakemake("--until", "evaluate_block")
+def test_a_part_of_the_study_that_is_done_is_asked_for_again_without_a_word_of_progress(longer_study, tmp_path):
+    done = longer_study.copied(tmp_path / "study").snakemake("--until", "evaluate_block")
     assert done.returncode == 0, done.stderr
     assert "left" not in done.stderr
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from reacher_shaping.settings.cell import PPO, Cell
@@ -57,13 +58,29 @@ def evaluation_seconds(evaluation: Evaluation, seeds: int, rates: Rates) -> floa
 
 def measured_rates(results: Path, reference: Path) -> Rates:
     """Return the rates of the blocks under `results`, else of the manifest of a reference run, else a guess."""
-    records = [_read(path) for path in results.glob("*/*/*/*/*/manifest.json")]
+    found = {path.parent: _read(path) for path in results.glob("*/*/*/*/*/manifest.json")}
+    records = list(found.values())
     training = _rate((record, work(_ppo(record))) for record in records if "settings" in record)
     evaluation = _rate((record.get("evaluation", {}), 1.0) for record in records)
     if training and evaluation:
-        return Rates(training, evaluation, source=f"the {len(records)} blocks in {results}")
+        source = f"the {len(records)} blocks in {results}"
+        return Rates(training, evaluation, start=_start(results, found) or Rates.start, source=source)
     training = _rate((block, 1.0) for block in _read(reference).get("blocks", []))
     return Rates(training, source="the reference run, on its machine") if training else Rates()
+
+
+def _start(results: Path, records: Mapping[Path, Mapping[str, Any]]) -> float:
+    """Median seconds of a training job, by Snakemake's benchmark of it, that its own record does not count.
+
+    0 without a benchmark, or where most jobs went on from a checkpoint, so that their records count more than one job.
+    """
+    beside = []
+    for folder, record in records.items():
+        benchmark = results / "benchmarks" / folder.relative_to(results) / "train.tsv"
+        if benchmark.exists() and "wall_seconds" in record:
+            job = float(benchmark.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
+            beside.append(job - record["wall_seconds"])
+    return max(0.0, median(beside)) if beside else 0.0
 
 
 def _ppo(record: Mapping[str, Any]) -> PPO:
