@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 QUICK := --directory build/quick --configfile workflow/quick.yaml
-FROM_TABLES := plot_figures plot_experiment format_tables run_notebook show_notebook
+FROM_TABLES := plot_figure format_tables run_notebook show_notebook
 # Where jobs run: PROFILE=slurm, or the path of a profile of your own; VERBOSE=1 says all that Snakemake says.
 PROFILE ?= default
 PLUGIN := $(if $(findstring slurm,$(PROFILE)),python -c 'import snakemake_executor_plugin_slurm' 2> /dev/null \

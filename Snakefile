@@ -32,14 +32,14 @@ onerror:
 
 
 include: "workflow/rules/cells.smk"
+include: "workflow/rules/studies.smk"
 include: "workflow/rules/resources.smk"
 include: "workflow/rules/train.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/peers.smk"
 include: "workflow/rules/analyse.smk"
+include: "workflow/rules/judge.smk"
 include: "workflow/rules/figures.smk"
-include: "workflow/rules/experiment_files.smk"
-include: "workflow/rules/experiments.smk"
 include: "workflow/rules/search.smk"
 include: "workflow/rules/notebooks.smk"
 include: "workflow/rules/media.smk"
@@ -54,23 +54,22 @@ rule all:
     default_target: True
     input:
         BLOCK_FILES,
-        TABLES,
+        tables_of(MAIN),
         RUN_RADII,
-        FIGURES,
         FORMATTED_TABLES,
         NOTEBOOKS,
         MEDIA,
         SHOWN_FILES,
         "results/check.txt",
         [path for name in MADE for path in runs_of(name)],
-        MADE_FIGURES,
+        figures_of(MADE),
         "report/report.html",
         "report/report.pdf",
         CRATE,
 
 
 # The last rules, so that the names of all others are known.
-for name in EXPERIMENTS:
+for name in STUDY.experiments:
     if workflow.is_rule(name):
         sys.exit(f"ConfigError: config: experiments: {name!r} is the name of a rule; allowed: any other name")
 
@@ -81,7 +80,7 @@ for name in EXPERIMENTS:
             runs_of(name),
             tables_of(name),
             f"results/experiments/{name}/check.txt",
-            figures_of(name),
+            figures_of([name]),
 
 
 if workflow.output_settings.stdout and not workflow.output_settings.quiet:  # a dry run, whose words go there

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import synthetic
 
-from reacher_shaping.analysis import comparisons, switch_effects
+from reacher_shaping.analysis import comparisons, correlation, switch_effects
 from reacher_shaping.analysis.baselines import AGREEMENT_METRICS
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.parts import Switches
@@ -83,5 +83,5 @@ def released() -> dict[str, pd.DataFrame]:
         "cells": synthetic.summary(labelled),
         "logs": logs,
         "comparisons": comparisons.comparison_frame(labelled, (*comparisons.METRICS, *comparisons.SPEED)),
-        "correlation": switch_effects.correlation_frame(labelled, synthetic.published(), "released"),
+        "correlation": correlation.over_protocols(labelled, synthetic.published(), "released"),
     }

@@ -21,15 +21,14 @@ import yaml
 
 from reacher_shaping.report.loader import load
 from reacher_shaping.report.readme import headline, put_headline
+from reacher_shaping.settings import outputs
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.settings.outputs import files_of
-from reacher_shaping.settings.study import Study, block_name, load_study, read_settings, settings_hash
+from reacher_shaping.settings.study import MAIN, Study, block_name, load_study, read_settings, settings_hash
 from reacher_shaping.storage.files import ArtifactError, check_seal, read_json, write_json, write_text
 from reacher_shaping.storage.provenance import require_asked
 from reacher_shaping.storage.reference import (
     POLICIES,
     checksums,
-    keep_experiments,
     keep_policies,
     keep_tables,
     manifest,
@@ -56,15 +55,17 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     """Write all of the reference run into an empty folder; return its manifest."""
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
-    keep_tables(RESULTS, folder)
-    keep_policies(RESULTS, folder, KEPT)
     ledger = yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8"))
     hypotheses = {entry["study"] for entry in ledger}
-    files = {name: files_of(study, name, hypotheses) for name in study.experiments}
-    further = {
-        name: manifests(study, study.experiment_cells[name], study.experiments[name].seeds)
-        for name in keep_experiments(RESULTS, folder, files)
-    }
+    further = {}
+    for name, own in study.studies.items():
+        tables, place = outputs.tables_of(study, name, hypotheses), outputs.folder(name)
+        if name != MAIN and not all((RESULTS / place / file).exists() for file in tables.values()):
+            continue
+        keep_tables(RESULTS / place, folder / place, tables)
+        if name != MAIN:
+            further[name] = manifests(study, study.cells_of[name], own.seeds)
+    keep_policies(RESULTS, folder, KEPT)
     figure = Path("figures/figure_2.svg")
     check_seal(figure)
     shutil.copyfile(figure, folder / FIGURE)

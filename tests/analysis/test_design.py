@@ -62,8 +62,8 @@ def test_tables_of_the_paper_do_not_change(make):
 
 
 def test_correlations_do_not_change():
-    ours = correlation.correlation_frame(MORE)
-    pd.testing.assert_frame_equal(ours, correlation.correlation_frame(PAPER))
+    ours = correlation.by_protocol(MORE)
+    pd.testing.assert_frame_equal(ours, correlation.by_protocol(PAPER))
     assert set(ours.loc[ours["level"] == "cells", "n"]) == {17}
 
 

@@ -11,7 +11,7 @@ import yaml
 
 from reacher_shaping.analysis.hypotheses import permutation_p, take_off_curves, take_off_frame, take_off_steps, verdicts
 from reacher_shaping.labels import KEY
-from reacher_shaping.settings.outputs import files_of
+from reacher_shaping.settings.outputs import tables_of
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.stats import holm
 from reacher_shaping.storage import schemas
@@ -104,7 +104,7 @@ def test_a_run_has_taken_off_where_five_iterations_average_one_half():
 @pytest.mark.parametrize("ledger", LEDGERS, ids=[ledger["study"] for ledger in LEDGERS])
 def test_the_ledger_names_cells_of_its_study_and_its_family_whole(ledger):
     study = load_study(read_settings(ROOT / "config.yaml"))
-    cells = {(cell.protocol.name, cell.variant.name, cell.alpha0) for cell in study.experiment_cells[ledger["study"]]}
+    cells = {(cell.protocol.name, cell.variant.name, cell.alpha0) for cell in study.cells_of[ledger["study"]]}
     assert ledger["family"] == [hypothesis["id"] for hypothesis in ledger["hypotheses"]]
     for hypothesis in ledger["hypotheses"]:
         for protocol, variant, alpha0 in (hypothesis["a"], hypothesis["b"], *hypothesis.get("beside", [])):
@@ -149,7 +149,7 @@ def test_a_run_shorter_than_the_window_never_takes_off_and_has_no_curve():
 def test_the_kept_sparse_run_is_complete_and_its_verdicts_are_those_of_its_runs():
     folder = ROOT / "report/sparse_run"
     study = load_study(read_settings(ROOT / "config.yaml"))
-    assert {path.name for path in folder.iterdir()} == {*files_of(study, "sparse", {"sparse"}), "README.md"}
+    assert {path.name for path in folder.iterdir()} == {*tables_of(study, "sparse", {"sparse"}).values(), "README.md"}
     runs = read_table(folder / "runs.parquet", schemas.RUNS)
     kept = read_table(folder / "hypotheses.csv", schemas.HYPOTHESES)
     (ledger,) = (ledger for ledger in LEDGERS if ledger["study"] == "sparse")

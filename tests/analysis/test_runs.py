@@ -6,7 +6,7 @@ import pytest
 import synthetic
 from scipy import stats as scipy_stats
 
-from reacher_shaping.analysis.correlation import CORRELATED, correlation_frame, correlations
+from reacher_shaping.analysis.correlation import CORRELATED, by_protocol, correlations
 from reacher_shaping.analysis.runs import (
     METRICS,
     OVER_EPISODES,
@@ -218,7 +218,7 @@ def test_interval_of_a_correlation_leaves_out_a_seed_in_every_cell_at_once(level
 def test_correlation_frame_keeps_appendix_and_protocols_apart():
     blocks = [make_block(name, budget=b) for name in ("none", "l2", "decay200k_l2sq") for b in (500_000, 1_000_000)]
     blocks += [make_block(name, protocol="standard") for name in ("none", "l2")]
-    frame = correlation_frame(runs_frame(blocks))
+    frame = by_protocol(runs_frame(blocks))
     n = frame.groupby(["protocol", "level"])["n"].first()
     assert n["paper"].to_dict() == {"cells": 4, "cells_all": 6, "runs": 12, "runs_all": 18}
     assert n["standard", "cells"] == 2

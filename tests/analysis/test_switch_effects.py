@@ -7,7 +7,7 @@ import synthetic
 from scipy import stats as scipy_stats
 from switched import MEANS, NOISE, PROTOCOLS, SWITCHES, labelled_runs, peers, runs
 
-from reacher_shaping.analysis import switch_effects
+from reacher_shaping.analysis import correlation, switch_effects
 from reacher_shaping.analysis.baselines import AGREEMENT_METRICS, agreement_frame
 from reacher_shaping.settings.cell import Environment
 
@@ -111,7 +111,7 @@ def test_logs_tell_peak_and_end_of_the_logged_return():
 
 def test_labels_correlate_over_the_cells_of_the_main_table():
     table = labelled_runs()
-    frame = switch_effects.correlation_frame(table, synthetic.published(), "released")
+    frame = correlation.over_protocols(table, synthetic.published(), "released")
 
     def r(level, x="alpha0", y="mean_return"):
         chosen = (frame["method"] == "pearson") & (frame["level"] == level) & (frame["x"] == x) & (frame["y"] == y)

@@ -1,32 +1,21 @@
-"""A figure is one function, its name in the rule that draws it, and its title and caption."""
-
-import re
-from pathlib import Path
+"""A figure is one function, its name among those of its study, and its title and caption."""
 
 import pandas as pd
 import pytest
 import synthetic
 
 from reacher_shaping.figures import drawing
-from reacher_shaping.report import captions
+from reacher_shaping.report import captions, study_sections
 from reacher_shaping.settings import outputs
 
-RULES = Path(__file__).parents[2] / "workflow" / "rules" / "figures.smk"
-NAMES = [
-    name
-    for line in RULES.read_text(encoding="utf-8").splitlines()
-    if line.startswith("FIGURE_NAMES ")
-    for name in re.findall(r'"(\w+)"', line)
-]
+
+def test_the_main_study_has_the_papers_figures_and_more():
+    assert outputs.MAIN_VIEWS[:4] == ("figure_1", "figure_2", "figure_3", "figure_4")
+    assert len(outputs.MAIN_VIEWS) > 4
 
 
-def test_the_rule_names_the_papers_figures_and_more():
-    assert NAMES[:4] == ["figure_1", "figure_2", "figure_3", "figure_4"]
-    assert len(NAMES) > 4
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_figure_of_the_rule_has_a_function_a_title_and_a_caption(name):
+@pytest.mark.parametrize("name", outputs.MAIN_VIEWS)
+def test_a_figure_of_the_main_study_has_a_function_a_title_and_a_caption(name):
     assert any(hasattr(module, name) for module in drawing.MAIN)
     cells, runs = synthetic.cells(synthetic.TOY_GRID, 2), synthetic.runs(synthetic.TOY_GRID, 2)
     assert captions.title(name)
@@ -36,8 +25,10 @@ def test_a_figure_of_the_rule_has_a_function_a_title_and_a_caption(name):
 @pytest.mark.parametrize("view", outputs.VIEWS)
 def test_a_figure_of_a_further_study_has_a_function_a_title_and_a_caption(view):
     assert any(hasattr(module, view) for module in drawing.STUDY)
-    assert captions.title(f"mine_{view}")
-    assert captions.caption(f"mine_{view}", synthetic.cells(synthetic.TOY_GRID, 2))
+    assert captions.title(view, "mine")
+    logs = pd.DataFrame({"protocol": ["p"], "budget": [1], "final_return": [-80.0]})
+    logged = logs.assign(alpha0=1.0, episode_return=-90.0)
+    assert study_sections.caption(view, {"logged": logged}, logs)
 
 
 def test_a_figure_is_drawn_from_the_tables_that_its_parameters_name():

@@ -97,11 +97,15 @@ def _snakemake(folder, *arguments, target="report/reference.html"):
 
 
 def _planned(folder):
-    """Inputs and outputs of each job of a dry run."""
-    rules = ["plot_figures", "format_tables", "run_notebook", "show_notebook", "build_reference_report"]
+    """Inputs and outputs of each rule's jobs in a dry run."""
+    rules = ["plot_figure", "format_tables", "run_notebook", "show_notebook", "build_reference_report"]
     said = _snakemake(folder, "--dry-run", "--quiet", "host", "--allowed-rules", *rules)
     jobs = re.findall(r"^ *(?:local)?rule (\w+):\n +input: (.*)\n +output: (.*)$", said, re.MULTILINE)
-    return {rule: (inputs.split(", "), outputs.split(", ")) for rule, inputs, outputs in jobs}
+    planned = {}
+    for rule, *files in jobs:
+        for known, names in zip(planned.setdefault(rule, ([], [])), files, strict=True):
+            known += names.split(", ")
+    return planned
 
 
 def _touch(folder, names):
@@ -123,8 +127,8 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
         if there:
             shutil.copy(KEPT / "peers.parquet", table)
         jobs = _planned(tmp_path)
-        assert ("results/peers.parquet" in jobs["plot_figures"][0]) is there
-        assert ("figures/peers.svg" in jobs["plot_figures"][1]) is there
+        assert ("results/peers.parquet" in jobs["plot_figure"][0]) is there
+        assert ("figures/peers.svg" in jobs["plot_figure"][1]) is there
         report = jobs["build_reference_report"][0]
         assert ("results/peers.parquet" in report, "figures/peers.svg" in report) == (there, there)
         assert "train_peer" not in jobs
@@ -132,7 +136,7 @@ def test_peers_are_part_of_figures_and_report_once_they_are_there(tmp_path):
     _touch(tmp_path, made)  # only what shows the peers is made
     other = tmp_path / "seeds.yaml"
     other.write_text("seeds: 77\nevaluation: {radius: 0.05}\n")
-    rules = ["plot_figures", "build_reference_report"]
+    rules = ["plot_figure", "build_reference_report"]
     _snakemake(tmp_path, "--configfile", other, "--allowed-rules", *rules)
     judged = tmp_path / "judged"  # apart: a kept run's report refuses tables that are not those that were kept
     shutil.copytree(tmp_path / "results", judged / "results")

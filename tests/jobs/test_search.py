@@ -172,7 +172,7 @@ def test_the_tuned_protocol_is_the_best_trial_of_the_kept_search():
     assert len(trials) == study.search.trials
     best = trials.loc[trials["mean_return"].idxmax()]
     protocol = study.protocols["tuned"].model_dump()
-    (shaped,) = [cell for cell in study.experiment_cells["tuned"] if cell.variant.name == study.search.variant]
+    (shaped,) = [cell for cell in study.cells_of["tuned"] if cell.variant.name == study.search.variant]
     for path in study.search.space:
         part, _, key = path.partition(".")
         value = protocol[part][key] if key else shaped.alpha0

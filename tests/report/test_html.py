@@ -219,7 +219,8 @@ def test_share_within_radius_may_be_missing(inputs):
 
 def test_budgets_of_peers_are_said_and_their_absence_too(page, inputs):
     assert "PPO 500K (3 seeds), SAC 100K (3 seeds), TD3 100K (3 seeds)" in page.text
-    text = Page(html.build(_changed(inputs, {"peers": None}))).text
+    figures = {name: path for name, path in inputs.figures.items() if name != "peers"}
+    text = Page(html.build(_changed(inputs, {"peers": None}, figures=figures))).text
     assert "No other algorithms have been trained" in text
     assert "TD3 100K" not in text
 

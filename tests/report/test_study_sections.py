@@ -13,7 +13,7 @@ from reacher_shaping.analysis.baselines import agreement_frame
 from reacher_shaping.figures.studies import switch_label
 from reacher_shaping.labels import number
 from reacher_shaping.report import paper_tables, study_sections, study_tables
-from reacher_shaping.storage.reference import read_studies
+from reacher_shaping.storage.reference import read_tables
 
 ROOT = Path(__file__).parents[2]
 
@@ -223,7 +223,7 @@ def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
 
 def test_a_study_with_hypotheses_tells_them_and_their_table_first():
     folder = ROOT / "report/sparse_run"
-    given = read_studies([str(path) for path in folder.iterdir() if path.suffix in (".csv", ".parquet")])["sparse_run"]
+    given = read_tables(folder)
     section = study_sections.section("sparse", given, LOGS)
     assert section.sentences[0].startswith("Of 9 hypotheses written down before the runs, 0 are supported, 0 contra")
     assert section.sentences[3].startswith("Beside the hypotheses"), "what nobody predicted comes after, and says so"

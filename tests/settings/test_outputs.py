@@ -2,7 +2,7 @@
 
 import pytest
 
-from reacher_shaping.settings.outputs import files_of, judged, table_files, views
+from reacher_shaping.settings.outputs import MAIN_VIEWS, judged, tables_of, views
 from reacher_shaping.settings.study import load_study, read_settings
 
 
@@ -22,16 +22,14 @@ def keys(*cells):
     ],
 )
 def test_views_follow_from_the_cells(cells, switches, expected):
-    assert views(cells, {"effects"} if switches else {}) == expected
+    assert views("mine", cells, {"effects"} if switches else {}) == expected
 
 
 def test_the_studies_of_the_configuration_have_theirs():
     study = load_study(read_settings("config.yaml"))
     found = {
-        name: views(
-            [cell.key for cell in cells], {file.partition(".")[0] for file in files_of(study, name, {"sparse"})}
-        )
-        for name, cells in study.experiment_cells.items()
+        name: views(name, [cell.key for cell in study.cells_of[name]], tables_of(study, name, {"sparse"}))
+        for name in study.studies
     }
     expected = {
         "released": ["cells", "log", "correlation", "forest"],
@@ -43,30 +41,32 @@ def test_the_studies_of_the_configuration_have_theirs():
         "tasks": ["cells", "log", "forest"],
         "long": ["cells", "log"],
         "ablation": ["cells", "effects"],
+        "main": list(MAIN_VIEWS[:-1]),  # without other algorithms, which nobody has asked for
     }
     assert {name: found[name] for name in expected} == expected
 
 
 def test_a_study_has_the_tables_that_it_asks_for():
     study = load_study(read_settings("config.yaml"))
-    files = {name: set(files_of(study, name, {"sparse"})) for name in study.experiments}
+    tables = {name: tables_of(study, name, {"sparse"}) for name in study.studies}
 
-    def having(file):
-        return {name for name, own in files.items() if file in own}
+    def having(table):
+        return {name for name, own in tables.items() if table in own}
 
-    assert having("hypotheses.csv") == having("takeoff.parquet") == having("targets.parquet") == {"sparse"}
-    assert "targets.parquet" not in files_of(study, "tasks", {"tasks"}), "no targets in Reacher's plane"
-    assert having("lengths.parquet") == {"long"}
-    assert having("effects.csv") == {"attribution", "ablation"}
-    assert having("agreement.csv") == {"standard"}
-    assert having("runs.parquet") == set(files)
+    assert having("hypotheses") == having("takeoff") == having("targets") == {"sparse"}
+    assert "targets" not in tables_of(study, "tasks", {"tasks"}), "no targets in Reacher's plane"
+    assert having("lengths") == having("long_episodes") == {"main", "long"}
+    assert having("effects") == {"attribution", "ablation"}
+    assert having("agreement") == {"standard"}
+    assert having("logs") == set(study.experiments)
+    assert having("lottery") == having("sensitivity") == {"main"}
+    assert having("runs") == having("comparisons") == having("correlation") == set(study.studies)
+    assert not having("peers"), "of the main study, an input only once they were asked for"
 
 
 def test_claims_are_judged_where_no_two_protocols_have_the_same_cell():
     study = load_study(read_settings("config.yaml"))
-    found = {name for name, cells in study.experiment_cells.items() if judged(cell.key for cell in cells)}
-    assert {"released", "standard", "tuned"} <= found
+    found = {name for name, cells in study.cells_of.items() if judged(cell.key for cell in cells)}
+    assert {"main", "released", "standard", "tuned"} <= found
     assert not found & {"attribution", "ablation", "sparse"}
-    files = table_files(switches=False, peers=False, claims=True)
-    assert {"claims.csv", "claim_parts.csv"} <= set(files)
-    assert "claims.csv" not in table_files(switches=False, peers=False, claims=False)
+    assert {name for name in study.studies if "claims" in tables_of(study, name, {})} == found

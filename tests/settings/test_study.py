@@ -103,13 +103,13 @@ def test_a_row_changes_the_settings_of_its_cells_only():
 
 def test_each_switch_is_turned_alone_and_taken_back_alone():
     study = load_study(DEFAULT)
-    cells = {cell.protocol.name: cell.protocol for cell in study.experiment_cells["attribution"]}
+    cells = {cell.protocol.name: cell.protocol for cell in study.cells_of["attribution"]}
     start, end = study.protocols["paper"], study.protocols["released_late"]
     switches = {
         "d1": ("environment", {"control_weight"}), "d2": ("ppo", {"ratio_pairs"}),
         "d3": ("ppo", {"gae_lambda"}), "d4": ("ppo", {"learning_rate"}),
     }  # fmt: skip
-    assert len(study.experiment_cells["attribution"]) == 2 * len(cells) == 2 * (2 + 2 * len(switches))
+    assert len(study.cells_of["attribution"]) == 2 * len(cells) == 2 * (2 + 2 * len(switches))
 
     def differing(one, other):
         one, other = one.model_dump(exclude={"name"}), other.model_dump(exclude={"name"})
@@ -137,7 +137,7 @@ def test_released_protocols_differ_by_the_last_commits_two_changes():
 
 def test_a_label_may_be_given_to_the_baseline():
     """The released run called `none` 0.5: its weight starts at one, so alpha0 needs no meaning."""
-    folders = [cell.folder for cell in load_study(DEFAULT).experiment_cells["released"]]
+    folders = [cell.folder for cell in load_study(DEFAULT).cells_of["released"]]
     assert "released_late/none/500000/alpha0.5" in folders
     assert len(folders) == 21
 

@@ -16,18 +16,20 @@ from reacher_shaping.figures.style import save
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.loader import load
 from reacher_shaping.report.readme import headline, put_headline
-from reacher_shaping.settings import outputs
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import ArtifactError, read_table, write_json, write_table, write_text
-from reacher_shaping.storage.reference import TABLES, checksums, keep_experiments, keep_tables, objections, replaced
+from reacher_shaping.storage.reference import checksums, keep_tables, objections, replaced
+from reacher_shaping.storage.tables import TABLES, of_study
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "report" / "reference"
+MAIN_TABLES = [name for name, entry in of_study({"main", "claims", "lengths"}).items() if entry.always]
 needs_reference = pytest.mark.skipif(not (KEPT / "manifest.json").exists(), reason="no reference run is kept")
 
 
 def read(name):
-    return read_table(KEPT / name, TABLES[name])
+    (entry,) = (entry for entry in TABLES.values() if entry.file == name)
+    return read_table(KEPT / name, entry.schema)
 
 
 def published():
@@ -73,50 +75,41 @@ def test_reference_cells_are_the_means_of_its_runs():
 
 @needs_reference
 def test_tables_kept_are_those_of_the_run(tmp_path):
-    keep_tables(KEPT, tmp_path)
-    for name in TABLES:
-        assert (tmp_path / name).exists(), name
+    keep_tables(KEPT, tmp_path, MAIN_TABLES)
+    for name in MAIN_TABLES:
+        assert (tmp_path / TABLES[name].file).exists(), name
     assert read("cells.parquet").equals(read_table(tmp_path / "cells.parquet", schemas.CELLS))
 
 
 @needs_reference
-def test_peers_are_kept_where_the_run_has_them_and_go_where_it_has_none(tmp_path):
-    results, kept = tmp_path / "results", tmp_path / "kept"
+def test_peers_are_kept_where_the_run_has_them(tmp_path):
+    results = tmp_path / "results"
     shutil.copytree(KEPT, results)
     (results / "peers.parquet").unlink(missing_ok=True)
+    keep_tables(results, tmp_path / "without", MAIN_TABLES)
+    assert not (tmp_path / "without/peers.parquet").exists()
+    assert (tmp_path / "without/runs.parquet").exists()
     write_table(results / "peers.parquet", synthetic.peers(), schemas.PEERS)
-    keep_tables(results, kept)
-    assert read_table(kept / "peers.parquet", schemas.PEERS).equals(synthetic.peers())
-    (results / "peers.parquet").unlink()
-    keep_tables(results, kept)
-    assert not (kept / "peers.parquet").exists()
-    assert (kept / "runs.parquet").exists()
+    keep_tables(results, tmp_path / "with", MAIN_TABLES)
+    assert read_table(tmp_path / "with/peers.parquet", schemas.PEERS).equals(synthetic.peers())
 
 
 @needs_reference
-def test_further_studies_that_were_made_are_kept(tmp_path):
+def test_nothing_is_kept_of_a_study_with_a_damaged_table(tmp_path):
     results, kept = tmp_path / "results", tmp_path / "kept"
-    shutil.copytree(KEPT, results / "experiments" / "mine")
-    logs = pd.DataFrame({"protocol": ["a"], "variant": ["none"], "budget": [1], "alpha0": [1.0], "seed": [0]})
-    write_table(results / "experiments/mine/logs.parquet", logs, schemas.LOGS)
-    shutil.copy(KEPT / "curves.parquet", results / "experiments/mine/logged.parquet")
-    (kept / "experiments" / "old").mkdir(parents=True)
-    files = outputs.table_files(switches=False, peers=False, claims=False)
-    assert keep_experiments(results, kept, {"mine": files, "yours": files}) == ["mine"]
-    assert [folder.name for folder in (kept / "experiments").iterdir()] == ["mine"]
-    assert {path.name for path in (kept / "experiments" / "mine").iterdir()} == set(files)
-    damaged = results / "experiments/mine/logs.parquet"
-    damaged.write_bytes(b"PAR1")
+    shutil.copytree(KEPT / "experiments" / "released", results)
+    names = of_study({"further", "claims"})
+    keep_tables(results, kept, names)
+    assert {path.name for path in kept.iterdir()} == {entry.file for entry in names.values()}
+    (results / "logs.parquet").write_bytes(b"PAR1")
     with pytest.raises(ArtifactError, match=r"logs\.parquet"):
-        keep_experiments(results, kept, {"mine": files})
-    assert (kept / "experiments/mine/logs.parquet").exists()  # what was kept stays until all is read
-    damaged.unlink()
-    assert keep_experiments(results, kept, {"mine": files}) == []
+        keep_tables(results, tmp_path / "again", names)
+    assert not (tmp_path / "again").exists()
 
 
 def test_run_that_lacks_a_table_cannot_be_the_reference(tmp_path):
     with pytest.raises(ArtifactError, match=r"runs\.parquet"):
-        keep_tables(tmp_path, tmp_path / "kept")
+        keep_tables(tmp_path, tmp_path / "kept", MAIN_TABLES)
 
 
 def test_a_run_agrees_with_itself_and_with_other_seeds_of_the_same_kind():

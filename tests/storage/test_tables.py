@@ -12,7 +12,7 @@ from reacher_shaping.storage import tables
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "report" / "reference"
 RULES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "workflow" / "rules").glob("*.smk"))
-CATALOGUE = [tables.BLOCK_TABLES, tables.STUDY_TABLES, tables.EXPERIMENT_TABLES]
+CATALOGUE = [tables.BLOCK_TABLES, tables.TABLES]
 
 
 def columns(path):
@@ -43,9 +43,9 @@ def test_rules_take_the_study_wide_tables_from_the_catalogue():
 )
 def test_kept_tables_are_in_the_catalogue_and_every_column_has_a_meaning(path):
     inside = path.startswith("experiments/")
-    catalogue = tables.EXPERIMENT_TABLES if inside else tables.STUDY_TABLES
-    files = {entry.file: entry for entry in catalogue.values()}
+    files = {entry.file: entry for entry in tables.TABLES.values()}
     entry = files[path.split("/", 2)[2] if inside else path]
+    assert entry.of != ("main" if inside else "further")
     for column in columns(KEPT / path):
         assert column in entry.schema.columns or entry.schema.measures
         assert table_docs.meaning(column)
@@ -58,9 +58,9 @@ def test_a_column_without_a_meaning_is_an_error():
 
 
 def test_reading_and_making_follow_the_catalogue():
-    assert tables.made_by("correlate", tables.STUDY_TABLES, "results") == {
-        "correlation": "results/correlation.csv",
-        "correlation_published": "results/correlation_published.csv",
+    assert tables.made_by("compare_runs", "results/{folder}") == {
+        "comparisons": "results/{folder}comparisons.parquet",
+        "correlation": "results/{folder}correlation.csv",
     }
-    assert "peers" not in tables.read_by("judge_claims", tables.STUDY_TABLES, "results")
-    assert tables.read_by("plot_figures", tables.STUDY_TABLES, "x")["cells"] == "x/cells.parquet"
+    assert "peers" not in tables.of_study({"further", "peers"})
+    assert "agreement" in tables.of_study({"further", "peers"})

@@ -64,7 +64,7 @@ def test_copy_without_snakemakes_records_is_never_shown_with_other_settings(copy
 READERS = {
     "build_crate": "ro-crate-metadata.json",
     "build_report": "report/report.html",
-    "summarise_episodes": "results/radii.parquet",
+    "summarise_radii": "results/radii.parquet",
     "aggregate_runs": "results/runs.parquet",
     "render_media": "results/media/paper-none-2048-alpha1.gif",
     "evaluate_long": f"{NONE}/long_episodes.parquet",

@@ -26,7 +26,7 @@ LEDGER = """
   {id: M1, claim: Ends differ., predicts: positive, a: [standard, none, 1], b: [paper, none, 1]}]}
 """
 NONE, DECAY = "results/paper/none/2048/alpha1", "results/paper/decay200k_l2sq/2048/alpha0.5"
-EVALUATION = {"evaluate_block", "aggregate_runs", "correlate", "judge_claims", "check_results", "plot_figures"}
+EVALUATION = {"evaluate_block", "aggregate_runs", "compare_runs", "judge_claims", "check_results", "plot_figure"}
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +59,8 @@ OVERLAYS = {
     'root_seed: !!int "abc"': "overlay.yaml, line 1: cannot be read as YAML: 'abc' is no int",
     f"root_seed: {'[' * 3000}{']' * 3000}": "overlay.yaml: is nested too deep",
     "evaluation: {radius: 1:30.5}": "config: evaluation.radius = '1:30.5': should be a valid number",
-    "experiments: {correlate: {seeds: 1, grid: [{variants: [none], budgets: [5e5]}]}}": "config: experiments: "
-    "'correlate' is the name of a rule",
+    "experiments: {compare_runs: {seeds: 1, grid: [{variants: [none], budgets: [5e5]}]}}": "config: experiments: "
+    "'compare_runs' is the name of a rule",
 }
 
 
@@ -295,7 +295,7 @@ def test_new_potential_and_schedule_rerun_nothing(project):
 def test_edit_of_a_plot_redraws_and_does_not_train(project):
     with project.edited("src/reacher_shaping/figures/paper.py", '"PPO iteration"', '"Iteration"'):
         jobs = project.planned()
-    shown = {"plot_figures", "build_report", "build_crate"}
+    shown = {"plot_figure", "build_report", "build_crate"}
     assert shown <= set(jobs) <= shown | {"run_notebook", "show_notebook"}
 
 
@@ -350,7 +350,7 @@ def test_block_made_again_has_the_same_bytes_and_reruns_nothing_else(project):
 def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp_path):
     copy = project.copied(tmp_path / "copy")
     with copy.configured(experiments={"mine": FURTHER}), copy.replaced("report/hypotheses.yaml", LEDGER):
-        assert "aggregate_experiment" not in copy.planned()  # a plain call is the main study alone
+        assert not [path for made in copy.planned().values() for path in made if "mine" in path]  # nor by a plain call
         shared = copy.planned("mine")["train_block"]
         assert not [path for path in shared if path.startswith(f"{NONE}/")]  # trained for the main study
         copy.run("mine")

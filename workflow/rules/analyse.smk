@@ -1,9 +1,6 @@
-# From the blocks' tables to the study's: runs, cells, learning curves, correlations, claims.
-TABLES = [f"results/{entry.file}" for entry in STUDY_TABLES.values() if entry.always]
-RUN_RADII = f"results/{STUDY_TABLES['run_radii'].file}"
-SEED_CURVES = f"results/{STUDY_TABLES['seed_curves'].file}"
-BLOCK_CELLS = block_cells(MAIN)
-ASKED = asked_of_blocks(STUDY.cells, STUDY.seeds)
+# From the blocks' tables to a study's: runs, cells, learning curves, comparisons, and what its episodes show.
+RUN_RADII = f"results/{TABLES['run_radii'].file}"
+SEED_CURVES = f"results/{TABLES['seed_curves'].file}"
 PUBLISHED = {
     "table2": source("report/published/table2.csv"),
     "table3": source("report/published/table3.csv"),
@@ -17,138 +14,163 @@ if not STORE and Path("results/runs.parquet").exists() and len({*map(os.path.exi
 
 rule aggregate_runs:
     input:
-        progress=expand("{block}/progress.parquet", block=BLOCKS),
-        episodes=expand("{block}/episodes.parquet", block=BLOCKS),
-        manifests=ancient(expand("{block}/manifest.json", block=BLOCKS)),
+        progress=of_blocks("progress.parquet"),
+        episodes=of_blocks("episodes.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
     output:
         **tables_made("aggregate_runs"),
     log:
-        "results/logs/aggregate_runs.log",
+        "results/logs/{folder}aggregate_runs.log",
     benchmark:
-        "results/benchmarks/aggregate_runs.tsv"
+        "results/benchmarks/{folder}aggregate_runs.tsv"
     threads: 1
     resources:
         mem_mb=growing(4000),
         runtime=growing(30),
     params:
-        cells=BLOCK_CELLS,
-        asked=ASKED,
+        cells=cells_of_blocks,
+        asked=of_study(asked_of_blocks),
         code=code("aggregate_runs"),
     script:
         "../scripts/aggregate_runs.py"
 
 
-rule correlate:
+rule check_results:
     input:
-        **PUBLISHED,
-        **tables_read("correlate"),
+        unpack(read_by("check_results")),
     output:
-        **tables_made("correlate"),
+        "results/{folder}check.txt",
     log:
-        "results/logs/correlate.log",
+        "results/logs/{folder}check_results.log",
     benchmark:
-        "results/benchmarks/correlate.tsv"
+        "results/benchmarks/{folder}check_results.tsv"
     threads: 1
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        code=code("correlate"),
+        cells=of_study(lambda cells, seeds: [cell.key for cell in cells]),
+        seeds=of_study(lambda cells, seeds: seeds),
+        episodes=STUDY.evaluation.episodes,
+        protocols=of_study(protocols_of),
+        code=of_study(lambda cells, seeds: code("check_results", tasks_of(cells))),
     script:
-        "../scripts/correlate.py"
-
-
-rule summarise_episodes:
-    input:
-        episodes=expand("{block}/episodes.parquet", block=BLOCKS),
-        manifests=ancient(expand("{block}/manifest.json", block=BLOCKS)),
-        long_episodes=expand("{block}/long_episodes.parquet", block=BLOCKS),
-        long_manifests=ancient(expand("{block}/long_episodes.json", block=BLOCKS)),
-    output:
-        **tables_made("summarise_episodes"),
-    log:
-        "results/logs/summarise_episodes.log",
-    benchmark:
-        "results/benchmarks/summarise_episodes.tsv"
-    threads: 1
-    resources:
-        mem_mb=growing(4000),
-        runtime=growing(30),
-    params:
-        cells=BLOCK_CELLS,
-        asked=ASKED,
-        code=code("summarise_episodes"),
-    script:
-        "../scripts/summarise_episodes.py"
+        "../scripts/check_results.py"
 
 
 rule compare_runs:
     input:
+        unpack(read_by("compare_runs")),
         **PUBLISHED,
-        **tables_read("compare_runs"),
     output:
         **tables_made("compare_runs"),
     log:
-        "results/logs/compare_runs.log",
+        "results/logs/{folder}compare_runs.log",
     benchmark:
-        "results/benchmarks/compare_runs.tsv"
+        "results/benchmarks/{folder}compare_runs.tsv"
     threads: 1
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        protocol=STUDY.cells[0].protocol.name,
-        root_seed=STUDY.root_seed,
+        study=study_of,
         code=code("compare_runs"),
     script:
         "../scripts/compare_runs.py"
 
 
-rule check_results:
+rule summarise_logs:
     input:
-        **tables_read("check_results"),
+        progress=of_blocks("progress.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
     output:
-        "results/check.txt",
+        **tables_made("summarise_logs"),
     log:
-        "results/logs/check_results.log",
+        "results/logs/{folder}summarise_logs.log",
     benchmark:
-        "results/benchmarks/check_results.tsv"
+        "results/benchmarks/{folder}summarise_logs.tsv"
+    wildcard_constraints:
+        folder=studies_of("summarise_logs"),
     threads: 1
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        cells=[cell.key for cell in STUDY.cells],
-        seeds=STUDY.seeds,
-        episodes=STUDY.evaluation.episodes,
-        protocols=protocols_of(STUDY.cells),
-        code=code("check_results", tasks_of(STUDY.cells)),
+        cells=cells_of_blocks,
+        asked=of_study(asked_of_blocks),
+        code=code("summarise_logs"),
     script:
-        "../scripts/check_results.py"
+        "../scripts/summarise_logs.py"
 
 
-rule judge_claims:
+rule summarise_lengths:
     input:
-        **PUBLISHED,
-        **tables_read("judge_claims"),
-        run_radii=RUN_RADII,
-        peers=PEERS,
-        second_runs=source("report/second_study/runs.parquet"),
-        second_long=source("report/second_study/long_episodes.parquet"),
-        ledger=source("report/claims.yaml"),
+        long_episodes=of_blocks("long_episodes.parquet"),
+        manifests=ancient(of_blocks("long_episodes.json")),
     output:
-        **tables_made("judge_claims"),
+        **tables_made("summarise_lengths"),
     log:
-        "results/logs/judge_claims.log",
+        "results/logs/{folder}summarise_lengths.log",
     benchmark:
-        "results/benchmarks/judge_claims.tsv"
+        "results/benchmarks/{folder}summarise_lengths.tsv"
+    wildcard_constraints:
+        folder=studies_of("summarise_lengths"),
     threads: 1
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        protocols=[STUDY.cells[0].protocol.name],
-        twins={},
-        code=code("judge_claims"),
+        cells=cells_of_blocks,
+        asked=of_study(asked_of_blocks),
+        code=code("summarise_lengths"),
     script:
-        "../scripts/judge_claims.py"
+        "../scripts/summarise_lengths.py"
+
+
+rule summarise_radii:
+    input:
+        episodes=of_blocks("episodes.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
+    output:
+        **tables_made("summarise_radii"),
+    log:
+        "results/logs/{folder}summarise_radii.log",
+    benchmark:
+        "results/benchmarks/{folder}summarise_radii.tsv"
+    wildcard_constraints:
+        folder=studies_of("summarise_radii"),
+    threads: 1
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing(30),
+    params:
+        cells=cells_of_blocks,
+        asked=of_study(asked_of_blocks),
+        code=code("summarise_radii"),
+    script:
+        "../scripts/summarise_radii.py"
+
+
+rule map_targets:
+    input:
+        episodes=of_blocks("episodes.parquet"),
+        manifests=ancient(of_blocks("manifest.json")),
+    output:
+        **tables_made("map_targets"),
+    log:
+        "results/logs/{folder}map_targets.log",
+    benchmark:
+        "results/benchmarks/{folder}map_targets.tsv"
+    wildcard_constraints:
+        folder=studies_of("map_targets"),
+    threads: 1
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
+    params:
+        cells=cells_of_blocks,
+        asked=of_study(asked_of_blocks),
+        root_seed=of_study(lambda cells, seeds: cells[0].root_seed),
+        code=code("map_targets"),
+    script:
+        "../scripts/map_targets.py"

@@ -3,13 +3,8 @@ from snakemake.io import IOFile
 
 from reacher_shaping.settings.study import MAIN, block_name
 
-EXPERIMENTS = STUDY.experiment_cells  # the further studies' cells, see experiments.smk
-CELLS = {cell.folder: cell for cells in [STUDY.cells, *EXPERIMENTS.values()] for cell in cells}
-SEEDS = {
-    block_name(seeds): seeds
-    for count in [STUDY.seeds, *(experiment.seeds for experiment in STUDY.experiments.values())]
-    for seeds in STUDY.blocks(count)
-}
+CELLS = {cell.folder: cell for cells in STUDY.cells_of.values() for cell in cells}
+SEEDS = {block_name(seeds): seeds for study in STUDY.studies.values() for seeds in STUDY.blocks(study.seeds)}
 
 
 def blocks(cells, seeds):
@@ -75,9 +70,7 @@ def tasks_of(cells):
 
 def seeds_of(cell):
     """Runs of a cell, as many as the study that asks for most."""
-    counts = {name: experiment.seeds for name, experiment in STUDY.experiments.items()}
-    asking = [counts[name] for name, cells in EXPERIMENTS.items() if cell in cells]
-    return max([STUDY.seeds] * (cell in STUDY.cells) + asking)
+    return max(study.seeds for name, study in STUDY.studies.items() if cell in STUDY.cells_of[name])
 
 
 def first_block(cell, file):

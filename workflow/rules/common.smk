@@ -14,7 +14,7 @@ from reacher_shaping.settings.base import ConfigError, short
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.settings.yaml_file import merged
 from reacher_shaping.storage.code_hash import code_hash
-from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES, made_by, read_by
+from reacher_shaping.storage.tables import TABLES, made_by
 
 UNFIT = set(" \t'\"$`\\;&|<>(){}[]*?!#") & set(sys.executable)  # Snakemake starts scripts by a shell, unquoted
 if UNFIT:
@@ -83,18 +83,6 @@ def made(path):
 WORDS = source("src/reacher_shaping/report/text.yaml")
 
 
-def tables_made(rule, experiment=None):
-    """The tables that a rule makes by their names, its output."""
-    if experiment:
-        return made_by(rule, EXPERIMENT_TABLES, f"results/experiments/{experiment}")
-    return made_by(rule, STUDY_TABLES, "results")
-
-
-def tables_read(rule):
-    """The study-wide tables that a rule reads by their names, its input."""
-    return read_by(rule, STUDY_TABLES, "results")
-
-
 @cache
 def code(script, chosen=()):
     """Hash of the code a script runs: a param, so that an edit of that code and nothing else reruns its jobs.
@@ -106,18 +94,9 @@ def code(script, chosen=()):
 
 def one_of(names):
     """A wildcard's constraint: these names alone, so that any other is a file that no rule makes."""
-    return "|".join(map(re.escape, names)) or "(?!)"
+    escaped = [re.escape(name) for name in names]  # that of the main study's folder is empty
+    return f"(?:{'|'.join(escaped)})" if escaped else "(?!)"
 
 
 def as_json(settings):
     return json.dumps(settings, sort_keys=True)
-
-
-def asked_of_peers(peers, protocol):
-    """What the manifests of other algorithms' runs must tell, in the order of their files."""
-    settings = {"protocol": protocol.model_dump(), "evaluation": STUDY.evaluation.model_dump()}
-    return [
-        as_json({"algorithm": algorithm, "seeds": [seed], "env_steps": budget, "settings": settings})
-        for algorithm, budget in peers.budgets.items()
-        for seed in range(peers.seeds)
-    ]

@@ -61,17 +61,17 @@ rule evaluate_controllers:
     output:
         **tables_made("evaluate_controllers"),
     log:
-        "results/logs/evaluate_controllers.log",
+        "results/logs/{folder}evaluate_controllers.log",
     benchmark:
-        "results/benchmarks/evaluate_controllers.tsv"
+        "results/benchmarks/{folder}evaluate_controllers.tsv"
     threads: 1
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
         evaluation=as_json(STUDY.evaluation.model_dump()),
-        protocols=protocols_of(STUDY.cells),
-        root_seed=STUDY.root_seed,
-        code=code("evaluate_controllers", tasks_of(STUDY.cells)),
+        protocols=of_study(protocols_of),
+        root_seed=of_study(lambda cells, seeds: cells[0].root_seed),
+        code=of_study(lambda cells, seeds: code("evaluate_controllers", tasks_of(cells))),
     script:
         "../scripts/evaluate_controllers.py"

@@ -1,11 +1,4 @@
-# From the study's tables to the paper's figures, further ones, and formatted tables.
-KINDS = ["svg", "pdf", "png"]
-# A figure is a function of `figures/paper.py` or `figures/robustness.py`, its name here, and its title and caption in
-# the report's text file.
-FIGURE_NAMES = ["figure_1", "figure_2", "figure_3", "figure_4"]
-FIGURE_NAMES += ["seed_strip", "profiles", "forest", "improvement", "success_by_radius", "long_episodes", "lottery"]
-FIGURE_NAMES += ["peers"] if PEERS else []
-FIGURES = expand("figures/{name}.{kind}", name=FIGURE_NAMES, kind=KINDS)
+# From a study's tables to its figures, and from the main one's to formatted tables.
 FORMATTED_TABLES = expand(
     "results/tables/{name}.{kind}",
     name=["table_1", "table_2", "table_3", "behaviour", "learning"],
@@ -17,33 +10,41 @@ KEPT = Path("results/manifest.json")
 RADIUS = (json.loads(KEPT.read_text())["study"] if KEPT.exists() else STUDY.model_dump())["evaluation"]["radius"]
 
 
-rule plot_figures:
+def tables_drawn(wildcards):
+    """The tables that the figures of a study read, by name."""
+    study, view = FIGURES[wildcards.figure]
+    return tables_read("plot_figure", study) | ({"peers": PEERS[0]} if view == "peers" else {})
+
+
+rule plot_figure:
     input:
+        unpack(tables_drawn),
         **PUBLISHED,
-        **tables_read("plot_figures"),
-        peers=PEERS,
+        training_logs=source("report/published/training_logs.csv"),
     output:
-        [report(path, category="Figures") if path.endswith(".svg") else path for path in FIGURES],
+        report("figures/{figure}.svg", category="Figures"),
+        expand("figures/{{figure}}.{kind}", kind=[kind for kind in KINDS if kind != "svg"]),
     log:
-        "results/logs/plot_figures.log",
+        "results/logs/figures/{figure}.log",
     benchmark:
-        "results/benchmarks/plot_figures.tsv"
+        "results/benchmarks/figures/{figure}.tsv"
     threads: 1
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        names=FIGURE_NAMES,
+        study=lambda wildcards: FIGURES[wildcards.figure][0],
+        view=lambda wildcards: FIGURES[wildcards.figure][1],
         radius=RADIUS,
-        code=code("plot_figures"),
+        code=code("plot_figure"),
     script:
-        "../scripts/plot_figures.py"
+        "../scripts/plot_figure.py"
 
 
 rule format_tables:
     input:
+        **tables_read("format_tables", MAIN),
         **PUBLISHED,
-        **tables_read("format_tables"),
         words=WORDS,
     output:
         [report(path, category="Tables") if path.endswith(".csv") else path for path in FORMATTED_TABLES],

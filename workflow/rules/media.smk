@@ -1,6 +1,4 @@
 # From a trained policy to a video of one evaluation episode, for each cell.
-from reacher_shaping.settings.outputs import shown_cells
-
 CELL_NAMES = {cell.name: cell for cell in STUDY.cells}
 MEDIA = expand("results/media/{name}.{kind}", name=CELL_NAMES, kind=["gif", "mp4"])
 
@@ -35,12 +33,11 @@ rule render_media:
 
 
 # From the policies of a few cells to those that the report's page lets its reader play: one run each, 20 kB.
-SHOWN_CELLS = shown_cells([*STUDY.cells, *(cell for name in MADE for cell in EXPERIMENTS[name])])
+SHOWN_CELLS = outputs.shown_cells(cell for cells, seeds in MADE_BLOCKS for cell in cells)
 SHOWN = "results/policies/policies.json"
 SHOWN_FILES = [SHOWN, *(f"results/policies/{name}.pt" for name in ["untrained", *SHOWN_CELLS] if SHOWN_CELLS)]
 SHOWN_SEEDS = [  # of a study that has trained the cell; another that would train more of it may not have been made
-    STUDY.blocks(next(count for cells, count in [(STUDY.cells, STUDY.seeds), *MADE_BLOCKS] if cell in cells))[0]
-    for cell in SHOWN_CELLS.values()
+    STUDY.blocks(next(count for cells, count in MADE_BLOCKS if cell in cells))[0] for cell in SHOWN_CELLS.values()
 ]
 SHOWN_BLOCKS = [f"results/{cell.folder}/{block_name(seeds)}" for cell, seeds in zip(SHOWN_CELLS.values(), SHOWN_SEEDS)]
 

@@ -6,7 +6,6 @@ NOTEBOOK_PAGES = expand("report/notebooks/{notebook}.html", notebook=NOTEBOOK_SO
 
 rule run_notebook:
     input:
-        TABLES,
         MADE_TABLES,
         **PUBLISHED,
         words=WORDS,

@@ -1,56 +1,80 @@
-# Other algorithms on the same task, an optional target: `snakemake peers`. Once made, they are part of the report.
-PEER_RUNS = expand(
-    "results/peers/{algorithm}/seed{seed}.parquet", algorithm=STUDY.peers.budgets, seed=range(STUDY.peers.seeds)
-)
-PEERS = [path for path in ["results/peers.parquet"] if made(path)]  # an input only once it is there
+# Other algorithms on the same task: of the main study an optional target, `snakemake peers`, that is part of the report
+# once it is made; of another study part of it, where it asks for them.
 
 
 rule peers:
     input:
-        PEER_RUNS,
+        peers_of(MAIN),
         "results/peers.parquet",
 
 
 rule train_peer:
     output:
-        run="results/peers/{algorithm}/seed{seed}.parquet",
-        manifest="results/peers/{algorithm}/seed{seed}.json",
+        run="results/{folder}peers/{algorithm}/seed{seed}.parquet",
+        manifest="results/{folder}peers/{algorithm}/seed{seed}.json",
     log:
-        "results/logs/peers/{algorithm}-{seed}.log",
+        "results/logs/{folder}peers/{algorithm}-{seed}.log",
     benchmark:
-        "results/benchmarks/peers/{algorithm}-{seed}.tsv"
+        "results/benchmarks/{folder}peers/{algorithm}-{seed}.tsv"
     wildcard_constraints:
-        algorithm=one_of(STUDY.peers.budgets),
+        folder=one_of(folder for folder, name in FOLDERS.items() if budgets_of_peers(name)),
+        algorithm=one_of(sorted({key for name in STUDY.studies for key in budgets_of_peers(name)})),
         seed=r"\d+",
     threads: 1
     resources:
         mem_mb=growing(2000),
-        runtime=lambda wildcards, attempt: attempt * minutes(STUDY.peers.budgets[wildcards.algorithm] / 50),
+        runtime=lambda wildcards, attempt: attempt * minutes(budget_of_peer(wildcards) / 50),
     params:
-        budget=lambda wildcards: STUDY.peers.budgets[wildcards.algorithm],
-        protocol=as_json(STUDY.cells[0].protocol.model_dump()),
+        budget=budget_of_peer,
+        protocol=of_study(lambda cells, seeds: as_json(cells[0].protocol.model_dump())),
         evaluation=as_json(STUDY.evaluation.model_dump()),
         root_seed=STUDY.root_seed,
-        code=code("train_peer", tasks_of(STUDY.cells)),
+        code=of_study(lambda cells, seeds: code("train_peer", tasks_of(cells))),
     script:
         "../scripts/train_peer.py"
 
 
 rule gather_peers:
     input:
-        PEER_RUNS,
+        peers_of(MAIN),
     output:
         **tables_made("gather_peers"),
     log:
-        "results/logs/gather_peers.log",
+        "results/logs/{folder}gather_peers.log",
     benchmark:
-        "results/benchmarks/gather_peers.tsv"
+        "results/benchmarks/{folder}gather_peers.tsv"
+    wildcard_constraints:
+        folder=studies_of("gather_peers"),
     threads: 1
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        asked=asked_of_peers(STUDY.peers, STUDY.cells[0].protocol),
+        asked=asked_of_peers(MAIN),
         code=code("gather_peers"),
     script:
         "../scripts/gather_peers.py"
+
+
+rule compare_with_peers:
+    input:
+        unpack(read_by("compare_with_peers")),
+        peers=lambda wildcards: peers_of(study_of(wildcards)),
+    output:
+        **tables_made("compare_with_peers"),
+    log:
+        "results/logs/{folder}compare_with_peers.log",
+    benchmark:
+        "results/benchmarks/{folder}compare_with_peers.tsv"
+    wildcard_constraints:
+        folder=studies_of("compare_with_peers"),
+    threads: 1
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(30),
+    params:
+        protocol=of_study(lambda cells, seeds: cells[0].protocol.name),
+        asked=lambda wildcards: asked_of_peers(study_of(wildcards)),
+        code=code("compare_with_peers"),
+    script:
+        "../scripts/compare_with_peers.py"

@@ -9,17 +9,15 @@ rule build_crate:
             expand(
                 "{block}/{file}", block=BLOCKS, file=["training.json", "long_episodes.parquet", "long_episodes.json"]
             ),
-            TABLES,
+            MADE_TABLES,
             RUN_RADII,
             SEED_CURVES,
-            FIGURES,
+            figures_of(MADE),
             FORMATTED_TABLES,
             NOTEBOOKS,
             MEDIA,
             SHOWN_FILES,
             PEERS,
-            MADE_TABLES,
-            MADE_FIGURES,
             "results/check.txt",
             "report/report.html",
             "report/report.pdf",
@@ -38,7 +36,7 @@ rule build_crate:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        asked=ASKED,
+        asked=asked_of_blocks(STUDY.cells, STUDY.seeds),
         study=as_json(STUDY.model_dump(mode="json")),
         settings_hash=SETTINGS_HASH,
         cells=len(STUDY.cells),

@@ -5,7 +5,7 @@ if STUDY.search:
 
     rule search:
         output:
-            **tables_made("search"),
+            **made_by("search", "results/"),
         log:
             "results/logs/search.log",
         benchmark:

@@ -35,5 +35,4 @@ with logged(snakemake):
     write_table(output.runs, runs, schemas.RUNS)
     write_table(output.cells, cells_frame(runs), schemas.CELLS)
     write_table(output.curves, learning_curves.curve_table(progress), schemas.CURVES)
-    if hasattr(output, "seed_curves"):  # of the main study
-        write_table(output.seed_curves, learning_curves.seed_curves(progress), schemas.SEED_CURVES)
+    write_table(output.seed_curves, learning_curves.seed_curves(progress), schemas.SEED_CURVES)

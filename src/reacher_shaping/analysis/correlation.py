@@ -72,7 +72,7 @@ def _columns(runs: pd.DataFrame, single: bool) -> tuple[dict[str, NDArray[np.flo
     return columns, int(known.sum())
 
 
-def correlation_frame(runs: pd.DataFrame) -> pd.DataFrame:
+def by_protocol(runs: pd.DataFrame) -> pd.DataFrame:
     """`correlation.csv`: the matrices of each protocol at four levels, with `protocol` as last column.
 
     | level | rows |
@@ -89,3 +89,24 @@ def correlation_frame(runs: pd.DataFrame) -> pd.DataFrame:
         if len(chosen)
     ]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=[*COLUMNS, "protocol"])
+
+
+def over_protocols(runs: pd.DataFrame, published: pd.DataFrame, name: str) -> pd.DataFrame:
+    """Correlations over all cells of a further study, whatever their protocol, in the form of `correlation.csv`.
+
+    Levels: `cells` and `runs` are the paper's main table, so without the appendix's variants and a baseline labelled
+    with another alpha0 than 1; `cells_all` has them too; `seed0`, `seed1`, ...: what a study of that seed would have
+    reported; and `published`, the paper's own table (`published` comes from `paper_tables.published_cells`).
+    """
+    labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
+    kept = runs[in_table_2(runs) & ~labelled]
+    levels = {"cells": kept, "runs": kept, "cells_all": runs[in_paper(runs)]}
+    levels["published"] = published[in_table_2(published)].assign(seed=0)
+    levels |= {f"seed{seed}": rows for seed, rows in kept.groupby("seed")}
+    parts = [correlations(rows, level) for level, rows in levels.items() if len(rows)]
+    return pd.concat(parts, ignore_index=True).assign(protocol=name)
+
+
+def of_published(published: pd.DataFrame) -> pd.DataFrame:
+    """The matrices of the published main table, a cell a run (`paper_tables.published_cells`)."""
+    return correlations(published[in_table_2(published)].assign(seed=0), "cells").assign(protocol="published")

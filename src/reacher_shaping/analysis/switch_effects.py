@@ -21,7 +21,6 @@ import pandas as pd
 
 from reacher_shaping import stats
 from reacher_shaping.analysis import learning_curves
-from reacher_shaping.analysis.correlation import correlations, in_paper, in_table_2
 from reacher_shaping.labels import KEY
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.parts import Switches
@@ -100,19 +99,3 @@ def logs_frame(progress: pd.DataFrame) -> pd.DataFrame:
         measured = {name: float(found[name][0]) for name in ("peak_return", "peak_iteration", "final_return")}
         rows.append(named | measured | {"action_std": float(own["action_std"].iloc[-1])})
     return pd.DataFrame(rows)
-
-
-def correlation_frame(runs: pd.DataFrame, published: pd.DataFrame, name: str) -> pd.DataFrame:
-    """Correlations over all cells of an experiment, whatever their protocol, in the form of `correlation.csv`.
-
-    Levels: `cells` and `runs` are the paper's main table, so without the appendix's variants and a baseline labelled
-    with another alpha0 than 1; `cells_all` has them too; `seed0`, `seed1`, ...: what a study of that seed would have
-    reported; and `published`, the paper's own table (`published` comes from `paper_tables.published_cells`).
-    """
-    labelled = (runs["variant"] == "none") & (runs["alpha0"] != 1)
-    kept = runs[in_table_2(runs) & ~labelled]
-    levels = {"cells": kept, "runs": kept, "cells_all": runs[in_paper(runs)]}
-    levels["published"] = published[in_table_2(published)].assign(seed=0)
-    levels |= {f"seed{seed}": rows for seed, rows in kept.groupby("seed")}
-    parts = [correlations(rows, level) for level, rows in levels.items() if len(rows)]
-    return pd.concat(parts, ignore_index=True).assign(protocol=name)

@@ -8,9 +8,15 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from reacher_shaping.figures import hypotheses, paper, robustness, studies
+from reacher_shaping.settings.study import MAIN as MAIN_STUDY
 
 MAIN = (paper, robustness)
 STUDY = (studies, hypotheses)
+
+
+def modules_of(study: str) -> tuple[ModuleType, ...]:
+    """Where the figures of a study are looked up: the main one has its own, which the paper has or which test it."""
+    return MAIN if study == MAIN_STUDY else STUDY
 
 
 def function_of(name: str, modules: tuple[ModuleType, ...] = MAIN) -> Callable[..., Figure]:

@@ -13,9 +13,6 @@ from reacher_shaping.settings.study import Study, block_name
 from reacher_shaping.storage.code_hash import code_hash
 from reacher_shaping.storage.files import ArtifactError, read_json
 
-MAIN = "main"
-"""What the study of the grid itself is called beside the further ones."""
-
 State = Literal["done", "trained", "missing", "other settings", "other code", "damaged"]
 
 
@@ -54,13 +51,10 @@ def _hash(script: Path, chosen: tuple[str, ...]) -> str:
 
 def blocks(study: Study) -> dict[Block, list[str]]:
     """Return every block of a configuration, each once, with the names of the studies that ask for it."""
-    asked = {MAIN: (study.cells, study.seeds)} | {
-        name: (cells, study.experiments[name].seeds) for name, cells in study.experiment_cells.items()
-    }
     found: dict[Block, list[str]] = {}
-    for name, (cells, seeds) in asked.items():
-        for cell in cells:
-            for part in study.blocks(seeds):
+    for name, own in study.studies.items():
+        for cell in study.cells_of[name]:
+            for part in study.blocks(own.seeds):
                 found.setdefault(Block(cell, part), []).append(name)
     return found
 

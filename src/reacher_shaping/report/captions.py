@@ -2,12 +2,11 @@
 
 import pandas as pd
 
-from reacher_shaping.analysis.hypotheses import TAKE_OFF_WINDOW
 from reacher_shaping.analysis.learning_curves import BURN_IN, WINDOW
 from reacher_shaping.analysis.runs import LEARNED
-from reacher_shaping.analysis.target_maps import SQUARE
 from reacher_shaping.labels import in_groups, of_protocol
-from reacher_shaping.report.text import say, words
+from reacher_shaping.report.text import say
+from reacher_shaping.settings.study import MAIN
 
 # What to say of runs that diverged (`diverged` in the file of words), and the groups of cells whose runs it counts.
 _MAIN, _APPENDIX = ("main",), ("appendix",)
@@ -24,46 +23,36 @@ DIVERGED = {
 }
 
 
-def title(stem: str) -> str:
+def title(stem: str, study: str = MAIN) -> str:
     """`figure_1` as `Figure 1. Training curves`; a figure the paper does not have is named without a number.
 
-    Raises KeyError where the file of words has no title for it.
+    `stem` is a figure or table of the main study, or a view of another. Raises KeyError where the file of words has no
+    title for it.
     """
-    view = _view(stem)
-    if view:
-        study = stem.rpartition("_")[0].replace("_", " ")
-        return say("study_figure", title=say(f"views.{view}.title"), study=study)
+    if study != MAIN:
+        return say("study_figure", title=say(f"views.{stem}.title"), study=study.replace("_", " "))
     kind, _, number = stem.partition("_")
     name = say(f"titles.{stem}")
     return f"{kind.capitalize()} {number}. {name}" if kind in ("figure", "table") and number.isdigit() else name
 
 
 def caption(stem: str, cells: pd.DataFrame, runs: pd.DataFrame | None = None, protocol: str | None = None) -> str:
-    """The caption of a figure or table, with the counts of seeds and episodes found in the tables.
+    """The caption of a figure or table of the main study, with the counts of seeds and episodes found in the tables.
 
     Raises KeyError where the file of words has none.
     """
     ours = of_protocol(cells, protocol)
     episodes = sorted(runs["episodes"].unique()) if runs is not None else []
-    view = _view(stem)
     text = say(
-        f"views.{view}.caption" if view else f"captions.{stem}",
+        f"captions.{stem}",
         seeds=_count(sorted(ours["seeds"].unique()), "seed"),
         episodes=" to ".join(f"{count:,}" for count in (episodes[:1] + episodes[1:][-1:])) or "the",
         interval=" or ".join(sorted(ours["interval"].unique())),
         window=WINDOW,
-        take_off=TAKE_OFF_WINDOW,
-        square=f"{1000 * SQUARE:g}",
         learned=f"{100 * LEARNED:g} %",
         burn_in=f"{100 * BURN_IN:g} %",
     )
     return f"{text} {_divergence(stem, ours)}".strip()
-
-
-def _view(stem: str) -> str | None:
-    """The name of a further study's view, where the stem is that of one and not of a figure of the main study."""
-    view = stem.rpartition("_")[2]
-    return view if "_" in stem and view in words()["views"] else None
 
 
 def _divergence(stem: str, cells: pd.DataFrame) -> str:

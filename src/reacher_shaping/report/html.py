@@ -40,6 +40,8 @@ from reacher_shaping.report.text_tables import (
     settings_grid,
     study_grid,
 )
+from reacher_shaping.settings import outputs
+from reacher_shaping.settings.study import MAIN
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
 SORTABLE = Path(__file__).parent / "vendor" / "sortable.js"
@@ -86,10 +88,11 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     study = inputs.study
     cells = of_protocol(study.tables["cells"], inputs.protocol)
     protocol = inputs.protocol or (str(cells["protocol"].iloc[0]) if len(cells) else "")
-    drawn = {name: _figure(name, path, inputs) for name, path in inputs.figures.items()}
-    own = ("figure_", *(f"{name}_" for name in study.experiments))
+    places = study_sections.figures_of(study)
+    drawn = {name: _figure(*places[name], path, inputs) for name, path in inputs.figures.items()}
     tables, videos = _tables(cells, inputs), pictures.videos(inputs.media, cells)
-    further = [picture for name, picture in drawn.items() if not name.startswith(own) and name not in OWN_SECTION]
+    main = [name for name in drawn if places[name][0] == MAIN]
+    further = [drawn[name] for name in main if not name.startswith("figure_") and name not in OWN_SECTION]
     facts = computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol)
     first = summary(study, inputs.protocol)
     charts = {
@@ -224,17 +227,16 @@ def _sentences(inputs: Inputs) -> dict[str, str]:
     return said
 
 
-def _figure(name: str, path: Path, inputs: Inputs) -> pictures.Picture:
+def _figure(owner: str, view: str, path: Path, inputs: Inputs) -> pictures.Picture:
     study = inputs.study
-    title = captions.title(name)
-    experiment, _, view = name.rpartition("_")
-    if experiment in study.experiments:
-        caption = study_sections.caption(view, study.experiments[experiment], study.training_logs)
+    title = captions.title(view, owner)
+    if owner == MAIN:
+        caption = captions.caption(view, study.tables["cells"], study.tables["runs"], inputs.protocol)
     else:
-        caption = captions.caption(name, study.tables["cells"], study.tables["runs"], inputs.protocol)
+        caption = study_sections.caption(view, study.experiments[owner], study.training_logs)
     alternative = f"{title}. {caption.split('. ')[0].rstrip('.')}."
-    study_name = experiment if experiment in study.experiments else ""
-    return pictures.Picture(name, title, caption, alternative, pictures.data_uri(path), sources(name, study_name))
+    name = outputs.stem(owner, view)
+    return pictures.Picture(name, title, caption, alternative, pictures.data_uri(path), sources(owner, view))
 
 
 def budgets_sentence(peers: pd.DataFrame) -> str:

@@ -10,9 +10,8 @@ import yaml
 
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.text import entry
-from reacher_shaping.storage.files import read_table
-from reacher_shaping.storage.reference import read_studies
-from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES
+from reacher_shaping.storage.reference import read_tables
+from reacher_shaping.storage.tables import of_study
 
 
 @dataclass(frozen=True)
@@ -40,19 +39,13 @@ def load(results: Path | str, published: Path | str) -> Study:
     Raises ArtifactError where a table is damaged.
     """
     results, published = Path(results), Path(published)
-    tables = {
-        name: read_table(results / table.file, table.schema)
-        for name, table in STUDY_TABLES.items()
-        if (results / table.file).exists()
-    }
-    files = [f"*/{table.file}" for table in EXPERIMENT_TABLES.values()]
-    paths = sorted(str(path) for file in files for path in (results / "experiments").glob(file))
+    further = {path.name: read_tables(path) for path in (results / "experiments").glob("*")}
     table2, table3, left_out, logs = (
         pd.read_csv(published / f"{name}.csv") for name in ("table2", "table3", "left_out", "training_logs")
     )
     return Study(
-        tables,
-        _complete(read_studies(paths)),
+        read_tables(results),
+        _complete(further),
         paper_tables.published_cells(table2, table3),
         paper_tables.published_cells(table2, table3, left_out),
         logs,
@@ -62,7 +55,7 @@ def load(results: Path | str, published: Path | str) -> Study:
 
 def _complete(found: Mapping[str, Mapping[str, pd.DataFrame]]) -> dict[str, Mapping[str, pd.DataFrame]]:
     """The further studies that have all their tables, in the order in which the words know them."""
-    needed = {name for name, table in EXPERIMENT_TABLES.items() if table.always}
+    needed = of_study(["further"]).keys()
     order = [
         *(name for name in entry("study_order") if name in found),
         *sorted(found.keys() - set(entry("study_order"))),

@@ -19,11 +19,13 @@ from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.figures.style import to_bytes
 from reacher_shaping.labels import KEY, setting_label, variant_label
 from reacher_shaping.report import study_tables, text_tables
+from reacher_shaping.report.loader import Study
 from reacher_shaping.report.quantities import in_words
 from reacher_shaping.report.study_tables import METRICS, SHAPING, decimals, interval, p_value
 from reacher_shaping.report.text import entry, say
 from reacher_shaping.report.text_tables import Grid
 from reacher_shaping.settings import outputs
+from reacher_shaping.settings.study import MAIN
 
 LEVEL = 0.05
 DIFFERENCE = ("difference", "ci_low", "ci_high")
@@ -56,13 +58,12 @@ def section(
 ) -> Section:
     """What the report says of one experiment.
 
-    `given` are its tables by name (`tables.EXPERIMENT_TABLES`), `words` its title and question, `training_logs` the
+    `given` are its tables by name (`storage.tables`), `words` its title and question, `training_logs` the
     published logs' summaries, `main` the main study's correlations, and `published` all published runs
     (`paper_tables.published_cells`).
     """
     said, found, first = [], {}, {}
-    keys = [{str(name): value for name, value in row.items()} for row in given["cells"].to_dict("records")]
-    shown = outputs.views(keys, given)
+    shown = views(name, given)
     if "hypotheses" in given:
         said += hypotheses_sentences(given["hypotheses"])
         said.append(say("study_sentences.exploratory"))
@@ -94,10 +95,22 @@ def section(
         found[say(f"study_tables.shaping_{family}")] = study_tables.shaping(corrected(shaped, SHAPING))
     found[say("study_tables.cells")] = study_tables.cells(given["cells"])
     words = {"title": protocol_label(name).capitalize(), "question": "", **(words or {})}
-    figures = [f"{name}_{view}" for view in shown]
+    figures = [outputs.stem(name, view) for view in shown]
     question = words["question"]
     question += "" if question.endswith((".", "?")) or not question else "."
     return Section(name, words["title"], question, [text for text in said if text], found, figures, first)
+
+
+def views(name: str, tables: Mapping[str, pd.DataFrame]) -> list[str]:
+    """Names of the figures that a study with these tables has."""
+    keys = [{str(key): value for key, value in row.items()} for row in tables["cells"].to_dict("records")]
+    return outputs.views(name, keys, tables)
+
+
+def figures_of(study: Study) -> dict[str, tuple[str, str]]:
+    """The figures of all studies by the names of their files: of each its study and view."""
+    studies = {MAIN: study.tables, **study.experiments}
+    return {outputs.stem(name, view): (name, view) for name, own in studies.items() for view in views(name, own)}
 
 
 def document(
@@ -112,9 +125,9 @@ def document(
         own = section(name, own_tables, training_logs, main, published)
         parts += [f"## {own.title}", own.intro, *own.sentences]
         parts += [f"{caption}:\n\n{text_tables.to_markdown(grid)}" for caption, grid in own.first.items()]
-        for figure in own.figures:
+        for view, figure in zip(views(name, own_tables), own.figures, strict=True):
             tables = {**own_tables, "training_logs": training_logs}
-            drawn = drawing.draw(figure.removeprefix(f"{name}_"), tables, drawing.STUDY)
+            drawn = drawing.draw(view, tables, drawing.modules_of(name))
             picture = base64.b64encode(to_bytes(drawn, "svg")).decode()
             parts.append(f'<img alt="{figure}" src="data:image/svg+xml;base64,{picture}">')
         parts += [f"{caption}:\n\n{text_tables.to_markdown(grid)}" for caption, grid in own.grids.items()]

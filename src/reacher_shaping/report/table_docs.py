@@ -15,7 +15,7 @@ from reacher_shaping.report.text import entry, say
 from reacher_shaping.storage import tables
 
 COLUMNS = Path(tables.__file__).with_name("columns.yaml")
-PLACES = ((tables.BLOCK_TABLES, "block"), (tables.STUDY_TABLES, "study"), (tables.EXPERIMENT_TABLES, "experiment"))
+PLACES = ((tables.BLOCK_TABLES, "block"), (tables.TABLES, "study"))
 
 
 @cache
@@ -63,6 +63,8 @@ def _section(name: str, table: tables.Entry) -> str:
         made_by=table.made_by,
         read_by=", ".join(f"`{rule}`" for rule in table.read_by) or say("table_docs.nobody"),
     )
+    if table.of:
+        about += f" {say('table_docs.of', kind=say(f'table_docs.kinds.{table.of}'))}"
     rows = [(column, kind, meaning(column)) for column, kind in table.schema.columns.items()]
     more = f"\n\n{say('table_docs.more')}" if table.schema.measures else ""
     return f"### {name}\n\n{about}\n\n{_rows(rows)}{more}"

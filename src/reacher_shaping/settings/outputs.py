@@ -1,13 +1,18 @@
-"""What a study has, by name: a further one's tables and figures, policies to show. Nothing heavy, for the workflow."""
+"""What a study has, by name: its tables and figures, policies to show. Nothing heavy, for the workflow."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.settings.study import Study
-from reacher_shaping.storage.tables import EXPERIMENT_TABLES
+from reacher_shaping.settings.study import MAIN, Study
+from reacher_shaping.storage import tables as catalogue
 
+MAIN_VIEWS = (
+    *("figure_1", "figure_2", "figure_3", "figure_4"),
+    *("seed_strip", "profiles", "forest", "improvement", "success_by_radius", "long_episodes", "lottery", "peers"),
+)
+"""Figures of the main study, in the order of the report; `peers` once there are runs of other algorithms."""
 VIEWS = ("cells", "dose", "takeoff", "targets", "effects", "log", "correlation", "forest")
 DOSES = 3
 """Weights of one variant from which on its effect is shown against the weight."""
@@ -32,46 +37,56 @@ def shown_cells(cells: Iterable[Cell]) -> dict[str, Cell]:
 
 
 def judged(keys: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether the paper's claims are judged on a study of these cells: no two protocols have the same one."""
+    """Whether no two protocols of these cells have the same one, so that they are one study of the paper's kind."""
     cells = [(cell["variant"], cell["budget"], cell["alpha0"]) for cell in keys]
     return len(set(cells)) == len(cells)
 
 
-def table_files(
-    *,
-    switches: bool,
-    peers: bool,
-    claims: bool = False,
-    hypotheses: bool = False,
-    targets: bool = False,
-    lengths: bool = False,
-) -> list[str]:
-    """Return the files of a study's tables: those of all, and those of a study that has what is named."""
-    has = {"effects": switches, "agreement": peers, "hypotheses": hypotheses, "lengths": lengths}
-    has |= {"claims": claims, "claim_parts": claims, "takeoff": hypotheses, "targets": targets}
-    return [entry.file for name, entry in EXPERIMENT_TABLES.items() if has.get(name, True)]
+def folder(name: str) -> str:
+    """Where a study's tables lie below `results/`: the main one's in it, with a slash at the end where there is one."""
+    return "" if name == MAIN else f"experiments/{name}/"
 
 
-def files_of(study: Study, name: str, hypotheses: Collection[str]) -> list[str]:
-    """Return the files of a further study's tables; `hypotheses` are the studies that have some of their own."""
-    own, cells = study.experiments[name], study.experiment_cells[name]
-    return table_files(
-        switches=own.switches is not None,
-        peers=own.peers is not None,
-        claims=judged(cell.key for cell in cells),
-        hypotheses=name in hypotheses,
-        targets=name in hypotheses and all(cell.protocol.environment.task == "reacher" for cell in cells),
-        lengths=own.lengths,
-    )
+def features(study: Study, name: str, hypotheses: Collection[str]) -> frozenset[str]:
+    """What a study has that others lack, and tables ask for; `hypotheses` are the studies that have some of their own.
+
+    The paper's claims are judged on the main study (on its first protocol), and on another of the paper's kind.
+    """
+    own, cells = study.studies[name], study.cells_of[name]
+    has = {
+        "main": name == MAIN,
+        "further": name != MAIN,
+        "claims": name == MAIN or judged(cell.key for cell in cells),
+        "switches": own.switches is not None,
+        "peers": own.peers is not None,
+        "lengths": own.lengths,
+        "hypotheses": name in hypotheses,
+        "targets": name in hypotheses and all(cell.protocol.environment.task == "reacher" for cell in cells),
+    }
+    return frozenset(feature for feature, there in has.items() if there)
 
 
-def views(keys: Iterable[Mapping[str, Any]], tables: Collection[str]) -> list[str]:
-    """Return the names of a study's figures, what its cells can show.
+def tables_of(study: Study, name: str, hypotheses: Collection[str]) -> dict[str, str]:
+    """Return the files of the tables that a study always has, by their names, below its folder."""
+    entries = catalogue.of_study(features(study, name, hypotheses))
+    return {table: entry.file for table, entry in entries.items() if entry.always}
+
+
+def stem(name: str, view: str) -> str:
+    """Name of the file of a study's figure: the main one's is called by its view alone."""
+    return view if name == MAIN else f"{name}_{view}"
+
+
+def views(name: str, keys: Iterable[Mapping[str, Any]], tables: Collection[str]) -> list[str]:
+    """Return the names of a study's figures: the main one's are fixed, another's are what its cells can show.
 
     Args:
+        name: of the study.
         keys: `protocol, variant, budget, alpha0` of its cells.
         tables: names of its tables; one that compares two protocols switch by switch has `effects`.
     """
+    if name == MAIN:
+        return [view for view in MAIN_VIEWS if view != "peers" or "peers" in tables]
     cells, switches = list(keys), "effects" in tables
     labels = {cell["alpha0"] for cell in cells if cell["variant"] == "none"}
     variants = {cell["protocol"]: {c["variant"] for c in cells if c["protocol"] == cell["protocol"]} for cell in cells}

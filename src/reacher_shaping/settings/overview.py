@@ -18,8 +18,8 @@ def overview(study: Study) -> str:
     ]
     lines.append(f"evaluation: {_pairs(study.evaluation.model_dump())}")
     lines.append(f"root_seed: {study.root_seed}, seeds: {study.seeds}, cells: {len(study.cells)}")
-    for name, cells in study.experiment_cells.items():
-        lines.append(f"experiments.{name}: seeds: {study.experiments[name].seeds}, cells: {len(cells)}")
+    for name, own in study.experiments.items():
+        lines.append(f"experiments.{name}: seeds: {own.seeds}, cells: {len(study.cells_of[name])}")
     return "\n".join(lines)
 
 

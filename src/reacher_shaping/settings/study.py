@@ -137,7 +137,7 @@ class Study(Settings):
         """Peers are held against the unshaped cells of the experiment's first protocol, and have its settings."""
         if experiment.peers is None:
             return
-        cells = self.experiment_cells[name]
+        cells = self.cells_of[name]
         protocol = cells[0].protocol
         budgets = {cell.budget for cell in cells if cell.protocol == protocol and cell.variant.name == "none"}
         for algorithm, budget in experiment.peers.budgets.items():
@@ -170,7 +170,7 @@ class Study(Settings):
     @cached_property
     def studies(self) -> dict[str, Experiment]:
         """The main study, under the name `main`, and the further ones."""
-        main = Experiment(title=self.title, question=self.question, seeds=self.seeds, grid=self.grid)
+        main = Experiment(title=self.title, question=self.question, seeds=self.seeds, grid=self.grid, lengths=True)
         return {MAIN: main, **self.experiments}
 
     @cached_property
@@ -182,12 +182,12 @@ class Study(Settings):
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """The cells of the main study, in the order of the grid."""
-        return tuple(cell for cell, _ in self.designs[MAIN])
+        return self.cells_of[MAIN]
 
     @cached_property
-    def experiment_cells(self) -> dict[str, tuple[Cell, ...]]:
-        """The cells of each further study, by its name; some may be another's or the main study's too."""
-        return {name: tuple(cell for cell, _ in self.designs[name]) for name in self.experiments}
+    def cells_of(self) -> dict[str, tuple[Cell, ...]]:
+        """The cells of each study, by its name; some may be another's too."""
+        return {name: tuple(cell for cell, _ in own) for name, own in self.designs.items()}
 
     def design(self, name: str) -> list[dict[str, Any]]:
         """The columns that each cell of a study has in its tables: the cell's key, and what the cell is for."""

@@ -8,7 +8,6 @@ from typing import Any
 
 import pandas as pd
 
-from reacher_shaping.storage.block_schemas import Table
 from reacher_shaping.storage.files import (
     check_seal,
     read_json,
@@ -18,23 +17,16 @@ from reacher_shaping.storage.files import (
     write_json,
     write_table,
 )
-from reacher_shaping.storage.tables import EXPERIMENT_TABLES, STUDY_TABLES
+from reacher_shaping.storage.tables import TABLES
 
-_KEPT = [entry for entry in STUDY_TABLES.values() if entry.kept]
-TABLES = {entry.file: entry.schema for entry in _KEPT if entry.always}
-"""The study-wide tables that make a reference run; all it takes to draw and tell the study again."""
 POLICIES = "policies"
 """Folder of the policies that a report shows."""
-OPTIONAL = {entry.file: entry.schema for entry in _KEPT if not entry.always}
-"""Tables that are kept with it where the run has them."""
 
 
-def read_studies(paths: Iterable[str]) -> dict[str, dict[str, pd.DataFrame]]:
-    """The tables of further studies by study and name, from their files. Raises ArtifactError."""
-    found: dict[str, dict[str, pd.DataFrame]] = {}
-    for path in map(Path, paths):
-        found.setdefault(path.parent.name, {})[path.stem] = read_table(path, EXPERIMENT_TABLES[path.stem].schema)
-    return found
+def read_tables(folder: Path) -> dict[str, pd.DataFrame]:
+    """The tables of a study that are in its folder, by name. Raises ArtifactError for a damaged one."""
+    paths = {name: folder / entry.file for name, entry in TABLES.items()}
+    return {name: read_table(path, TABLES[name].schema) for name, path in paths.items() if path.exists()}
 
 
 @contextmanager
@@ -94,33 +86,15 @@ def _runs(record: Mapping[str, Any]) -> int:
     return sum(len(block["seeds"]) for block in record["blocks"])
 
 
-def keep_tables(results: Path, kept: Path) -> None:
-    """Write the reference tables of `results` into the folder `kept`; an optional one that is not there is none there.
+def keep_tables(results: Path, kept: Path, names: Iterable[str]) -> None:
+    """Write tables of a study, by name, and those not always there that are, from its folder into the folder `kept`.
 
-    Raises ArtifactError where another is missing or damaged.
+    Raises ArtifactError, and writes nothing, where one is missing or damaged.
     """
-    for name, table in (TABLES | OPTIONAL).items():
-        if name in OPTIONAL and not (results / name).exists():
-            (kept / name).unlink(missing_ok=True)
-            continue
-        _keep(results / name, kept / name, table)
-
-
-def keep_experiments(results: Path, kept: Path, files: Mapping[str, Sequence[str]]) -> list[str]:
-    """Write the tables of those further studies that are complete; return their names. Raises ArtifactError.
-
-    `files` are the names of each study's tables.
-    """
-    folders = {name: results / "experiments" / name for name in files}
-    made = [name for name, folder in folders.items() if all((folder / file).exists() for file in files[name])]
-    found = read_studies(str(folders[name] / file) for name in made for file in files[name])
-    shutil.rmtree(kept / "experiments", ignore_errors=True)
-    for name in made:
-        for file in files[name]:
-            stem = Path(file).stem
-            target = kept / "experiments" / name / file
-            write_table(target, found[name][stem], EXPERIMENT_TABLES[stem].schema, sealed=False)
-    return made
+    more = [name for name, entry in TABLES.items() if not entry.always and (results / entry.file).exists()]
+    found = {name: read_table(results / TABLES[name].file, TABLES[name].schema) for name in (*names, *more)}
+    for name, table in found.items():
+        write_table(kept / TABLES[name].file, table, TABLES[name].schema, sealed=False)
 
 
 def keep_policies(results: Path, kept: Path, before: Path) -> None:
@@ -141,10 +115,6 @@ def keep_policies(results: Path, kept: Path, before: Path) -> None:
         shown |= found
     if shown:
         write_json(kept / POLICIES / "policies.json", shown)
-
-
-def _keep(source: Path, target: Path, table: Table) -> None:
-    write_table(target, read_table(source, table), table, sealed=False)
 
 
 def manifest(

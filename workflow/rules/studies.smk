@@ -1,0 +1,139 @@
+# What each study of config.yaml is made of and makes. The main one's files lie in results/, another's in
+# results/experiments/NAME/: the wildcard `folder` is empty for the first. A further study is an optional target of its
+# name, `snakemake attribution`; once made it is part of the report: MADE are the main study and those that are there.
+import yaml
+
+from reacher_shaping.settings import outputs
+
+HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())}
+FEATURES = {name: outputs.features(STUDY, name, HYPOTHESES) for name in STUDY.studies}
+FOLDERS = {outputs.folder(name): name for name in STUDY.studies}
+
+
+def study_of(wildcards):
+    """The study that a wildcard names."""
+    return FOLDERS[wildcards.folder]
+
+
+def of_study(make):
+    """A param or input made of the cells and seeds of the study that a wildcard names."""
+    return lambda wildcards: make(STUDY.cells_of[study_of(wildcards)], STUDY.studies[study_of(wildcards)].seeds)
+
+
+def of_blocks(file):
+    """A file of each block of a study, in the order of `cells_of_blocks`."""
+    return of_study(lambda cells, seeds: [f"{block}/{file}" for block in blocks(cells, seeds)])
+
+
+def cells_of_blocks(wildcards):
+    """Of each of those blocks the columns of its cell."""
+    return block_cells(study_of(wildcards))
+
+
+def tables_made(rule):
+    """The tables that a rule makes by their names, its output."""
+    return made_by(rule, "results/{folder}")
+
+
+def studies_of(rule):
+    """The wildcard's constraint for a rule: folders of the studies that have the tables it makes."""
+    wanted = {entry.of for entry in TABLES.values() if entry.made_by == rule}
+    return one_of(folder for folder, name in FOLDERS.items() if wanted <= {"", *FEATURES[name]})
+
+
+def tables_read(rule, study):
+    """The tables of a study that a rule reads by their names, its input."""
+    files = outputs.tables_of(STUDY, study, HYPOTHESES)
+    return {name: f"results/{outputs.folder(study)}{files[name]}" for name in files if rule in TABLES[name].read_by}
+
+
+def read_by(rule):
+    """The same of the study that a wildcard names, to be unpacked."""
+    return lambda wildcards: tables_read(rule, study_of(wildcards))
+
+
+def tables_of(study):
+    """Files of all tables that a study always has."""
+    return [f"results/{outputs.folder(study)}{file}" for file in outputs.tables_of(STUDY, study, HYPOTHESES).values()]
+
+
+def runs_of(study):
+    """What a study's tables are made of. A target names it too, see `rule all`."""
+    return [
+        f"{block}/{file}"
+        for block in blocks(STUDY.cells_of[study], STUDY.studies[study].seeds)
+        for file in ["policy.pt", "progress.parquet", "episodes.parquet", "manifest.json"]
+    ]
+
+
+def views_of(study):
+    """A study's figures by the names of their files, each with its view."""
+    tables = [*outputs.tables_of(STUDY, study, HYPOTHESES), *(["peers"] if PEERS else [])]
+    keys = [cell.key for cell in STUDY.cells_of[study]]
+    return {outputs.stem(study, view): view for view in outputs.views(study, keys, tables)}
+
+
+def settings_of_peers(study):
+    """The other algorithms that a study asks for, if it does: the main one's are asked for beside it."""
+    return STUDY.peers if study == MAIN else STUDY.studies[study].peers
+
+
+def budgets_of_peers(study):
+    """Environment steps of each of them."""
+    peers = settings_of_peers(study)
+    return peers.budgets if peers else {}
+
+
+def budget_of_peer(wildcards):
+    return budgets_of_peers(study_of(wildcards))[wildcards.algorithm]
+
+
+def peers_of(study):
+    """Files of their runs."""
+    path = f"results/{outputs.folder(study)}peers/{{algorithm}}/seed{{seed}}.parquet"
+    budgets = budgets_of_peers(study)
+    return expand(path, algorithm=budgets, seed=range(settings_of_peers(study).seeds)) if budgets else []
+
+
+def asked_of_peers(study):
+    """What the manifests of those runs must tell, in their order."""
+    protocol = STUDY.cells_of[study][0].protocol
+    settings = {"protocol": protocol.model_dump(), "evaluation": STUDY.evaluation.model_dump()}
+    return [
+        as_json({"algorithm": algorithm, "seeds": [seed], "env_steps": budget, "settings": settings})
+        for algorithm, budget in budgets_of_peers(study).items()
+        for seed in range(settings_of_peers(study).seeds)
+    ]
+
+
+def twins(cells):
+    """By protocol, variants that it trains as another of the config: `decay_potential` overrides a variant's own."""
+    found = {}
+    for protocol in {cell.protocol.name: cell.protocol for cell in cells}.values():
+        potential = protocol.shaping.decay_potential
+        for variant in STUDY.variants.values():
+            if potential not in ("variant", variant.potential) and variant.schedule != "constant":
+                trained = variant.model_copy(update={"potential": potential})
+                same = [v.name for v in STUDY.variants.values() if v == trained.model_copy(update={"name": v.name})]
+                found.setdefault(protocol.name, {}).update({variant.name: name for name in same})
+    return found
+
+
+PEERS = [path for path in ["results/peers.parquet"] if made(path)]  # an input only once it is there
+MADE = [name for name in STUDY.studies if name == MAIN or all(made(path) for path in tables_of(name))]
+MADE_TABLES = [path for name in MADE for path in tables_of(name)]
+MADE_BLOCKS = [(STUDY.cells_of[name], STUDY.studies[name].seeds) for name in MADE]
+FIGURES = {figure: (name, view) for name in STUDY.studies for figure, view in views_of(name).items()}
+KINDS = ["svg", "pdf", "png"]
+
+
+def figures_of(studies):
+    """Files of the figures of some studies."""
+    return expand(
+        "figures/{name}.{kind}", name=[key for key, (name, _) in FIGURES.items() if name in studies], kind=KINDS
+    )
+
+
+wildcard_constraints:
+    folder=one_of(FOLDERS),
+    figure=one_of(FIGURES),
