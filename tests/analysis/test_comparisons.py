@@ -200,3 +200,15 @@ def test_baseline_with_the_same_label_is_the_partner_where_there_is_one():
     shaped = {"protocol": "p", "variant": "l2", "budget": 100, "alpha0": 0.5, **synthetic.design("l2")}
     assert comparisons.partner("none", shaped, cells)["alpha0"] == 0.5
     assert comparisons.partner("none", shaped | {"protocol": "q"}, cells)["alpha0"] == 1.0
+
+
+def test_what_is_said_of_all_cells_by_hand():
+    power = pd.DataFrame({"seeds_needed": [12.0, np.nan, 3.0]})
+    assert comparisons.median_seeds_needed(power) == 12  # a cell without a number takes more than any
+    assert comparisons.median_seeds_needed(power.iloc[:2]) == np.inf
+    variance = pd.DataFrame({"seed_variance": [3.0, 0.0, 1.0], "evaluation_variance": [1.0, 0.0, 3.0]})
+    shares = comparisons.seed_shares(variance)
+    assert shares[[0, 2]].to_list() == [0.75, 0.25]
+    assert np.isnan(shares[1])
+    assert comparisons.extent(shares) == (0.25, 0.5, 0.75)
+    assert comparisons.mean_difference(pd.DataFrame({"difference": [0.1, 0.3]})) == pytest.approx(0.2)

@@ -32,3 +32,9 @@ def test_blocks_of_versions_with_other_bits_are_told_in_the_report(versions, tol
         assert rows["Bits"].endswith(told)
         assert "no one machine makes all of them again" in rows["Bits"]
     assert rows["Environment steps"] == "8,192"
+
+
+def test_speed_is_the_median_of_the_jobs_with_the_slowest_and_the_fastest():
+    jobs = [MANIFEST | {"env_steps_per_second": speed} for speed in (1000.0, 9000.0, 2000.0, 4000.0)]
+    rows = dict(computation.grid(jobs).rows)
+    assert rows["Steps per second of a job"] == "3,000 (median; 1,000 to 9,000)"

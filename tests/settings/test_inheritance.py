@@ -1,11 +1,13 @@
 """A protocol says what differs from another, a value where it is from; both are resolved first."""
 
+import json
+
 import pytest
 
 from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.inheritance import resolved
-from reacher_shaping.settings.study import load_study, settings_hash
+from reacher_shaping.settings.study import load_study, read_settings, settings_hash
 
 PAPER = {
     "environment": {"control_weight": {"value": 0.2, "source": "paper 3.1"}},
@@ -59,6 +61,25 @@ def test_a_value_changed_without_a_source_does_not_keep_the_old_one():
     changed = {"from": "paper", "ppo": {"epochs": 9}}
     sources = load_study(study(paper=PAPER, late=changed)).sources
     assert "protocols.late.ppo.epochs" not in sources
+
+
+def test_the_source_of_a_part_is_that_of_its_settings_that_have_none(tmp_path):
+    part = {"source": "paper 3.2", "discount": 0.9, "epochs": {"value": 7, "source": "release"}}
+    late = {"from": "paper", "ppo": {"discount": 0.8, "clip_range": {"value": 0.1, "source": "ours"}}}
+    (tmp_path / "config.yaml").write_text(json.dumps(study(paper={"ppo": part}, late=late)))
+    (tmp_path / "overlay.yaml").write_text("protocols: {paper: {ppo: {gae_lambda: 0.5}}}")
+
+    def sources(*files):
+        made = load_study(read_settings(*(tmp_path / file for file in files)))
+        assert made.protocols["late"].ppo.model_dump() | {"gae_lambda": 0.95} == made.protocols[
+            "paper"
+        ].ppo.model_dump() | {"discount": 0.8, "clip_range": 0.1, "gae_lambda": 0.95}
+        return {key.removeprefix("protocols."): text for key, text in made.sources.items() if "ppo" in key}
+
+    expected = {"paper.ppo.discount": "paper 3.2", "paper.ppo.epochs": "release"}
+    expected |= {"late.ppo.epochs": "release", "late.ppo.clip_range": "ours"}
+    assert sources("config.yaml") == expected, "the heir's discount is not the paper's"
+    assert sources("config.yaml", "overlay.yaml") == expected, "nor is what another file lays over it"
 
 
 def test_sources_and_inheritance_change_no_cell():

@@ -157,6 +157,28 @@ def power_frame(runs: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
+def median_seeds_needed(power: pd.DataFrame) -> float:
+    """The seeds that the median of these cells of `power_frame` takes; infinite where no number of seeds helps it."""
+    return float(power["seeds_needed"].fillna(np.inf).median())
+
+
+def seed_shares(variance: pd.DataFrame) -> "pd.Series[float]":
+    """The seeds' share of the variance of each cell of `variance_frame`, 0 to 1; missing where there is none."""
+    total = variance["seed_variance"] + variance["evaluation_variance"]
+    return (variance["seed_variance"] / total).where(total > 0)
+
+
+def extent(values: "pd.Series[float]") -> tuple[float, float, float]:
+    """The least of the known values, their median, and the greatest."""
+    low, middle, high = values.quantile([0.0, 0.5, 1.0])
+    return float(low), float(middle), float(high)
+
+
+def mean_difference(compared: pd.DataFrame) -> float:
+    """Mean over rows of `comparison_frame`."""
+    return float(compared["difference"].mean())
+
+
 def roughness_stability(blocks: Iterable[Block]) -> pd.DataFrame:
     """Does roughness depend on smoothing? Rank correlation over runs of each window with no smoothing.
 

@@ -99,3 +99,8 @@ def logs_frame(progress: pd.DataFrame) -> pd.DataFrame:
         measured = {name: float(found[name][0]) for name in ("peak_return", "peak_iteration", "final_return")}
         rows.append(named | measured | {"action_std": float(own["action_std"].iloc[-1])})
     return pd.DataFrame(rows)
+
+
+def log_span(values: "pd.Series[float]") -> tuple[float, float, float]:
+    """Mean over a cell's runs of a column of `logs_frame`, the least and the greatest."""
+    return float(values.mean()), float(values.min()), float(values.max())

@@ -105,7 +105,7 @@ def _mark_maximum(axes: Axes) -> None:
     x, y = (np.asarray(values, dtype=float) for values in curve.get_data())
     maximum = float(y.max())
     axes.axhline(maximum, color=QUIET, linestyle="--", linewidth=1, label="_maximum")
-    late = x[y.argmax()] > x.mean()  # the number stands on the side away from the point it belongs to
+    late = x[y.argmax()] > (x[0] + x[-1]) / 2  # the number stands on the side away from the point it belongs to
     axes.annotate(
         f"max {number(maximum, 2)}", (0.0 if late else 1.0, maximum), xycoords=("axes fraction", "data"),
         xytext=(3 if late else -3, 3), textcoords="offset points", ha="left" if late else "right", va="bottom",

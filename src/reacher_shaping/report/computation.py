@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from reacher_shaping.analysis.comparisons import extent
 from reacher_shaping.report.text import say
 from reacher_shaping.report.text_tables import Grid
 from reacher_shaping.storage.provenance import mixed_versions
@@ -51,7 +52,7 @@ def grid(manifests: Manifests) -> Grid | None:
     }
     frame = pd.DataFrame([{name: row.get(name, np.nan) for name in NUMBERS} for row in manifests])
     total = frame.sum()
-    speed = frame["env_steps_per_second"].quantile([0.0, 0.5, 1.0]).tolist()
+    least, median, most = extent(frame["env_steps_per_second"])
     rows = [[say(f"computation.{name}"), "; ".join(dict.fromkeys(values))] for name, values in several.items()]
     rows += [
         [say("computation.jobs"), f"{len(frame):,}"],
@@ -60,7 +61,7 @@ def grid(manifests: Manifests) -> Grid | None:
             say("computation.time"),
             say("computation.hours", wall=total["wall_seconds"] / 3600, cpu=total["cpu_seconds"] / 3600),
         ],
-        [say("computation.speed"), say("computation.speeds", least=speed[0], median=speed[1], most=speed[2])],
+        [say("computation.speed"), say("computation.speeds", least=least, median=median, most=most)],
     ]
     packages: dict[str, dict[str, None]] = {}
     for manifest in manifests:

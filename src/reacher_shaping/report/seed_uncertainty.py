@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reacher_shaping.analysis import single_seed_studies
+from reacher_shaping.analysis import comparisons, single_seed_studies
 from reacher_shaping.labels import cell_order, number, of_protocol
 from reacher_shaping.report import paper_tables
 from reacher_shaping.report.text import entry, say
@@ -44,7 +44,7 @@ def power_sentence(power: pd.DataFrame, protocol: str | None = None) -> str:
         return say("seeds.power_unknown")
     seeds = sorted(known["seeds"].unique())
     ours = f"{seeds[0]:.0f}" if len(seeds) == 1 else _span(f"{seeds[0]:.0f}", f"{seeds[-1]:.0f}")
-    middle = float(np.median(known["seeds_needed"].fillna(np.inf)))
+    middle = comparisons.median_seeds_needed(known)
     needed = f"{np.ceil(middle):,.0f}" if np.isfinite(middle) else say("seeds.more_than", count=f"{MOST:,}")
     enough, three = ((known[name] >= POWER).sum() for name in ("power", "power_3"))
     return say("seeds.power", ours=ours, power=POWER, enough=enough, cells=len(known), three=three, needed=needed)
@@ -59,35 +59,30 @@ def _needed(row: dict[Any, Any]) -> str:
 def variance_grid(variance: pd.DataFrame, protocol: str | None = None) -> Grid:
     """A row per cell: standard deviations of the success rate from seeds and from evaluation, and the seeds' share."""
     headings = [*CELL_HEADINGS, *entry("tables.variance")]
+    own = of_protocol(variance, protocol)
     rows = [
         [
             *_cell(row),
             f"{row['seeds']:.0f}",
             _text(100 * np.sqrt(row["seed_variance"]), 1),
             _text(100 * np.sqrt(row["evaluation_variance"]), 1),
-            _percent(_share(row)),
+            _percent(row["share"]),
         ]
-        for row in _sorted(of_protocol(variance, protocol))
+        for row in _sorted(own.assign(share=comparisons.seed_shares(own)))
     ]
     return Grid(headings, rows)
 
 
 def variance_sentence(variance: pd.DataFrame, protocol: str | None = None) -> str:
     """What the table of variances says: would more seeds or more evaluation episodes narrow the intervals?"""
-    shares = np.array([_share(row) for row in _sorted(of_protocol(variance, protocol))], dtype=float)
-    shares = shares[np.isfinite(shares)]
-    if not shares.size:
+    shares = comparisons.seed_shares(of_protocol(variance, protocol))
+    if not shares.notna().any():
         return say("seeds.variance_unknown")
-    middle = float(np.median(shares))
+    low, middle, high = comparisons.extent(shares)
     sources = entry("seeds.sources")
     more, other = sources if middle > 0.5 else reversed(sources)
-    least, most = _percent(shares.min()), _percent(shares.max())
+    least, most = _percent(low), _percent(high)
     return say("seeds.variance", middle=_percent(middle), least=least, most=most, more=more, other=other)
-
-
-def _share(row: dict[Any, Any]) -> float:
-    total = row["seed_variance"] + row["evaluation_variance"]
-    return float(row["seed_variance"] / total) if total > 0 else float("nan")
 
 
 def winners_grid(winners: pd.DataFrame) -> Grid:

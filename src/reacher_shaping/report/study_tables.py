@@ -5,6 +5,7 @@ from typing import Any
 
 import pandas as pd
 
+from reacher_shaping.analysis.switch_effects import log_span
 from reacher_shaping.figures.studies import KINDS, protocol_label, switch_label
 from reacher_shaping.labels import (
     CELL,
@@ -144,7 +145,7 @@ def logs(table: pd.DataFrame, training_logs: pd.DataFrame) -> Grid:
     """A row per cell, and a row per published log of one of them."""
 
     def span(values: "pd.Series[float]", digits: int) -> str:
-        low, mean, high = (number(value, digits) for value in (values.min(), values.mean(), values.max()))
+        mean, low, high = (number(value, digits) for value in log_span(values))
         return f"{mean} [{low}, {high}]"
 
     rows = []

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reacher_shaping.analysis.comparisons import corrected
+from reacher_shaping.analysis.comparisons import corrected, mean_difference
 from reacher_shaping.labels import CELL, in_groups, number, of_protocol, stochastic
 from reacher_shaping.report.loader import Study
 from reacher_shaping.report.quantities import shown, with_interval
@@ -119,7 +119,7 @@ def _by_family(name: str, study: Study, protocol: str | None) -> Answer | None:
     if rows.empty:
         return None
     apart, cells = apart_from(study.tables.get("comparisons"), words["family"], protocol)
-    effect = number(100 * rows["difference"].mean(), 1)
+    effect = number(100 * mean_difference(rows), 1)
     because = say(f"questions.{name}.reason", effect=effect, apart=apart, cells=cells)
     return Answer(words["ask"], say("short.apart" if apart else "short.same"), because, words["link"])
 

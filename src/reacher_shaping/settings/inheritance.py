@@ -12,15 +12,42 @@ def resolved(config: Mapping[Any, Any]) -> dict[Any, Any]:
 
     A protocol with `from: OTHER` is OTHER with its own settings laid over it. `{value: V, source: S}` is V, and a
     mapping with `source` beside other keys is that mapping without it; `sources` maps the place of each, such as
-    `protocols.paper.ppo.discount`, to its text. Raises ValueError.
+    `protocols.paper.ppo.discount`, to its text. The `source` of a part of a protocol, such as `ppo`, is that of each of
+    its settings that has none. Raises ValueError.
     """
+    config = sourced(config)
     protocols = config.get("protocols")
     if isinstance(protocols, Mapping):
-        config = {**config, "protocols": {name: _inherited(protocols, name, ()) for name in protocols}}
+        config["protocols"] = {name: _inherited(protocols, name, ()) for name in protocols}
     sources: dict[str, str] = {}
     plain = {key: _plain(value, str(key), sources) for key, value in config.items()}
     known = plain.get("sources", {})
     return {**plain, "sources": {**known, **sources}} if isinstance(known, Mapping) else plain
+
+
+def sourced(config: Mapping[Any, Any]) -> dict[Any, Any]:
+    """Return a configuration with the source of a protocol's part beside each of its settings that has none.
+
+    Done before anything is laid over it: what is changed then, by an heir or another file, has not that source.
+    """
+    protocols = config.get("protocols")
+    if not isinstance(protocols, Mapping):
+        return {**config}
+    each = {
+        name: {key: _each_sourced(part) for key, part in own.items()} if isinstance(own, Mapping) else own
+        for name, own in protocols.items()
+    }
+    return {**config, "protocols": each}
+
+
+def _each_sourced(part: Any) -> Any:
+    if not isinstance(part, Mapping) or not isinstance(part.get("source"), str):
+        return part
+    return {
+        key: value if isinstance(value, Mapping) else {"value": value, "source": part["source"]}
+        for key, value in part.items()
+        if key != "source"
+    }
 
 
 def _inherited(protocols: Mapping[Any, Any], name: Any, heirs: tuple[Any, ...]) -> Any:

@@ -29,7 +29,7 @@ def config_schema() -> dict[str, Any]:
     parent = {"type": "string", "description": "The protocol that all settings which are not named are taken from."}
     schema["$defs"]["Protocol"]["properties"]["from"] = parent
     del schema["properties"]["sources"]
-    about = "Where a value is from: a section of the paper, the release, or ours and why."
+    about = "Where a value is from, or all values of a part: a section of the paper, the release, or ours and why."
     schema["$defs"]["Source"] = {"type": "string", "description": about}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

@@ -27,7 +27,7 @@ from reacher_shaping.settings.base import (
 )
 from reacher_shaping.settings.cell import Cell, Protocol, Variant
 from reacher_shaping.settings.grid import Known, Placed, placed
-from reacher_shaping.settings.inheritance import resolved
+from reacher_shaping.settings.inheritance import resolved, sourced
 from reacher_shaping.settings.parts import Evaluation, Experiment, Peers, Rows
 from reacher_shaping.settings.search import Search
 from reacher_shaping.settings.yaml_file import merged, read_mapping, spelt_out
@@ -247,4 +247,4 @@ def load_study(source: Mapping[str, Any] | Path | str) -> Study:
 
 def read_settings(*paths: Path | str) -> dict[str, Any]:
     """What YAML files say, each laid over those before it. Raises ConfigError."""
-    return merged({}, *(read_mapping(path, tuple(Study.model_fields)) for path in paths))
+    return merged({}, *(sourced(read_mapping(path, tuple(Study.model_fields))) for path in paths))
