@@ -10,12 +10,6 @@ KEPT = Path("results/manifest.json")
 RADIUS = (json.loads(KEPT.read_text())["study"] if KEPT.exists() else STUDY.model_dump())["evaluation"]["radius"]
 
 
-def tables_drawn(wildcards):
-    """The tables that the figures of a study read, by name."""
-    study, view = FIGURES[wildcards.figure]
-    return tables_read("plot_figure", study) | ({"peers": PEERS[0]} if view == "peers" else {})
-
-
 rule plot_figure:
     input:
         unpack(tables_drawn),

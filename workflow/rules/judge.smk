@@ -1,24 +1,6 @@
 # From a study's tables to what they decide: claims of the paper, hypotheses of our own, switches, what few seeds carry.
 
 
-def of_claims(wildcards):
-    """What the claims are held against, beside the study's own tables: of the main one other algorithms, and another run."""
-    if study_of(wildcards) != MAIN:
-        return {}
-    second = {"second_runs": "runs", "second_long": "long_episodes"}
-    return {
-        "run_radii": RUN_RADII,
-        "peers": PEERS,
-        **{name: source(f"report/second_study/{table}.parquet") for name, table in second.items()},
-    }
-
-
-def claimed_protocols(wildcards):
-    """The protocols whose runs the claims are judged on: of the main study its first."""
-    names = list(dict.fromkeys(cell.protocol.name for cell in STUDY.cells_of[study_of(wildcards)]))
-    return names[:1] if study_of(wildcards) == MAIN else names
-
-
 rule judge_claims:
     input:
         unpack(read_by("judge_claims")),

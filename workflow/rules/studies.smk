@@ -134,6 +134,30 @@ def figures_of(studies):
     )
 
 
+def of_claims(wildcards):
+    """What the claims are held against, beside the study's own tables: of the main one other algorithms, and another run."""
+    if study_of(wildcards) != MAIN:
+        return {}
+    second = {"second_runs": "runs", "second_long": "long_episodes"}
+    return {
+        "run_radii": RUN_RADII,
+        "peers": PEERS,
+        **{name: source(f"report/second_study/{table}.parquet") for name, table in second.items()},
+    }
+
+
+def claimed_protocols(wildcards):
+    """The protocols whose runs the claims are judged on: of the main study its first."""
+    names = list(dict.fromkeys(cell.protocol.name for cell in STUDY.cells_of[study_of(wildcards)]))
+    return names[:1] if study_of(wildcards) == MAIN else names
+
+
+def tables_drawn(wildcards):
+    """The tables that the figures of a study read, by name."""
+    study, view = FIGURES[wildcards.figure]
+    return tables_read("plot_figure", study) | ({"peers": PEERS[0]} if view == "peers" else {})
+
+
 wildcard_constraints:
     folder=one_of(FOLDERS),
     figure=one_of(FIGURES),
