@@ -69,7 +69,7 @@ def features(study: Study, name: str, hypotheses: Collection[str]) -> frozenset[
 def tables_of(study: Study, name: str, hypotheses: Collection[str]) -> dict[str, str]:
     """Return the files of the tables that a study always has, by their names, below its folder."""
     entries = catalogue.of_study(features(study, name, hypotheses))
-    return {table: entry.file for table, entry in entries.items() if entry.always}
+    return {table: entry.file for table, entry in entries.items()}
 
 
 def stem(name: str, view: str) -> str:

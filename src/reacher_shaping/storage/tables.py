@@ -272,5 +272,5 @@ def made_by(rule: str, folder: str) -> dict[str, str]:
 
 
 def of_study(features: Collection[str]) -> dict[str, Entry]:
-    """The tables of a study that has these features (`settings.outputs.features`), by name."""
-    return {name: entry for name, entry in TABLES.items() if not entry.of or entry.of in features}
+    """The tables that a study with these features (`settings.outputs.features`) always has, by name."""
+    return {name: entry for name, entry in TABLES.items() if entry.always and entry.of in {"", *features}}
