@@ -26,11 +26,11 @@ def test_scores_are_mean_iqm_and_chance_to_beat_none():
 def test_profile_is_the_share_of_runs_above_each_threshold():
     runs = synthetic.runs(GRID, 5)
     runs["success_rate"] = np.where(runs["variant"] == "l2", 0.5, 0.1)
-    table = scores.profiles_frame(runs).set_index(["group", "threshold"])["share"]
+    table = scores.profiles_frame(runs).set_index(["kind", "threshold"])["share"]
     assert table.loc["constant", 0.2] == 0.5  # l2 of l2 and l2sq
     assert table.loc["none", 0.2] == 0
     assert table.loc["constant", 0.08] == table.loc["none", 0.08] == 1
-    assert table.groupby("group").apply(lambda shares: shares.is_monotonic_decreasing).all()
+    assert table.groupby("kind").apply(lambda shares: shares.is_monotonic_decreasing).all()
 
 
 def test_profile_limits_stay_within_nothing_and_all():

@@ -11,6 +11,7 @@ import pytest
 import synthetic
 
 from reacher_shaping.analysis.agreement import agreement, compare, compare_verdicts, verdicts_agree
+from reacher_shaping.analysis.scores import profiles_frame
 from reacher_shaping.figures import paper
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import paper_tables
@@ -71,6 +72,12 @@ def test_reference_cells_are_the_means_of_its_runs():
     assert np.allclose(means, kept.loc[means.index], rtol=0, atol=1e-12)
     assert len(cells) == 23
     assert (cells["seeds"] == runs.groupby(["variant", "budget", "alpha0"]).size().iloc[0]).all()
+
+
+@needs_reference
+def test_profiles_kept_are_those_of_the_runs_kept():
+    made = profiles_frame(read("runs.parquet"))
+    pd.testing.assert_frame_equal(made, read("profiles.parquet"), rtol=1e-12)
 
 
 @needs_reference

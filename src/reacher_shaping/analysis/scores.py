@@ -40,18 +40,18 @@ def scores_frame(runs: pd.DataFrame) -> pd.DataFrame:
 def profiles_frame(runs: pd.DataFrame) -> pd.DataFrame:
     """`profiles.parquet`: share of the runs of a kind of variants whose success is above a threshold.
 
-    The paper's cells alone count. In `group` their kind: `none`, `constant`, `decay`, or `decay_l2sq`, the appendix's.
-    Columns: protocol, group, budget, threshold, seeds, share, share_low, share_high. A seed's share is over the kind's
+    The paper's cells alone count. In `kind`: `none`, `constant`, `decay`, or `decay_l2sq`, the appendix's.
+    Columns: protocol, kind, budget, threshold, seeds, share, share_low, share_high. A seed's share is over the kind's
     cells, so the limits are t limits over seeds, ending at 0 and 1.
     """
     paper = runs[in_paper(runs)]
     kinds = [paper["variant"] == "none", paper["schedule"] == "constant", paper["group"] == "appendix"]
-    named = paper.assign(group=np.select(kinds, ["none", "constant", "decay_l2sq"], "decay"))
+    named = paper.assign(kind=np.select(kinds, ["none", "constant", "decay_l2sq"], "decay"))
     rows = []
-    for key, own in named.groupby(["protocol", "group", "budget"]):
+    for key, own in named.groupby(["protocol", "kind", "budget"]):
         for threshold in THRESHOLDS:
             share = (own["success_rate"] > threshold).groupby(own["seed"]).mean()
             low, high = np.clip(stats.t_interval(share), 0.0, 1.0)
             rows.append((*key, threshold, len(share), stats.mean(share), low, high))
-    columns = ["protocol", "group", "budget", "threshold", "seeds", "share", "share_low", "share_high"]
+    columns = ["protocol", "kind", "budget", "threshold", "seeds", "share", "share_low", "share_high"]
     return pd.DataFrame(rows, columns=columns)

@@ -259,14 +259,14 @@ def lottery(lottery: pd.DataFrame) -> Figure:
     return figure
 
 
-GROUP_NAMES = {"none": "none", "constant": "constant", "decay": "decay", "decay_l2sq": "decay, L2²"}
-GROUP_LOOKS = {"none": "none", "constant": "l2", "decay": "decay300k", "decay_l2sq": "decay300k_l2sq"}
-"""The variant whose look stands for a group."""
+KIND_NAMES = {"none": "none", "constant": "constant", "decay": "decay", "decay_l2sq": "decay, L2²"}
+KIND_LOOKS = {"none": "none", "constant": "l2", "decay": "decay300k", "decay_l2sq": "decay300k_l2sq"}
+"""The variant whose look stands for a kind."""
 
 
 @look()
 def profiles(profiles: pd.DataFrame, protocol: str | None = None) -> Figure:
-    """A panel per budget, a line per group of variants: the share of runs whose success is above a threshold."""
+    """A panel per budget, a line per kind of variants: the share of runs whose success is above a threshold."""
     ours = of_protocol(profiles, protocol)
     if ours.empty:
         return empty_figure()
@@ -274,12 +274,12 @@ def profiles(profiles: pd.DataFrame, protocol: str | None = None) -> Figure:
     figure = Figure(figsize=(3.6 * len(budgets) + 0.6, 3.2))
     panels = np.atleast_1d(figure.subplots(1, len(budgets), sharey=True))
     for axes, budget in zip(panels, budgets, strict=True):
-        for group, variant in GROUP_LOOKS.items():
-            own = ours[(ours["budget"] == budget) & (ours["group"] == group)].sort_values("threshold")
+        for kind, variant in KIND_LOOKS.items():
+            own = ours[(ours["budget"] == budget) & (ours["kind"] == kind)].sort_values("threshold")
             if own.empty:
                 continue
             drawn = variant_look(variant)
-            line = {"color": drawn.color, "dashes": drawn.dashes, "label": GROUP_NAMES[group]}
+            line = {"color": drawn.color, "dashes": drawn.dashes, "label": KIND_NAMES[kind]}
             axes.plot(own["threshold"], own["share"], drawstyle="steps-post", **line)
             edges = {"step": "post", "color": drawn.color, "alpha": 0.14, "linewidth": 0}
             axes.fill_between(own["threshold"], own["share_low"], own["share_high"], **edges)

@@ -71,5 +71,5 @@ WINNERS = Table({"variant": TEXT, "budget": INTEGER, "alpha0": NUMBER, "share": 
 SPREAD = Table({"quantity": TEXT}, measures=True)
 SCORES = Table({**_CELL, "metric": TEXT, "seeds": INTEGER}, measures=True)
 PROFILES = Table(
-    {"protocol": TEXT, "group": TEXT, "budget": INTEGER, "threshold": NUMBER, "seeds": INTEGER}, measures=True
+    {"protocol": TEXT, "kind": TEXT, "budget": INTEGER, "threshold": NUMBER, "seeds": INTEGER}, measures=True
 )

@@ -218,7 +218,7 @@ TABLES = {
     "profiles": Entry(
         "profiles.parquet",
         schemas.PROFILES,
-        "a group of variants, a budget and a success rate",
+        "a kind of variants, a budget and a success rate",
         "weigh_seeds",
         ("plot_figure",),
         of="main",
