@@ -13,6 +13,7 @@ from reacher_shaping.analysis.baselines import agreement_frame
 from reacher_shaping.figures.studies import switch_label
 from reacher_shaping.labels import number
 from reacher_shaping.report import paper_tables, study_sections, study_tables
+from reacher_shaping.report.loader import Study
 from reacher_shaping.storage.reference import read_tables
 
 ROOT = Path(__file__).parents[2]
@@ -198,6 +199,16 @@ def test_nothing_is_shown_without_a_minus_sign():
 def test_question_of_a_study_ends_as_a_sentence(released):
     for question, told in (("What", "What."), ("Why?", "Why?"), ("So.", "So."), ("", "")):
         assert study_sections.section("mine", released, LOGS, words={"question": question}).intro == told
+
+
+def test_a_figure_belongs_to_the_study_that_draws_it_whatever_its_name(released):
+    """The main study has a figure `long_episodes`, which a study called `long` does not take."""
+    published = synthetic.published()
+    study = Study({"cells": released["cells"]}, {"long": released}, published, published, LOGS)
+    figures = study_sections.figures_of(study)
+    assert figures["long_episodes"] == ("main", "long_episodes")
+    assert figures["long_cells"] == ("long", "cells")
+    assert "peers" not in figures
 
 
 def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
