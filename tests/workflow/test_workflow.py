@@ -249,7 +249,8 @@ def test_snakemakes_own_report_shows_figures_tables_and_the_report(project, tmp_
     project.run("--report", str(tmp_path / "snakemake.html"))
     page = (tmp_path / "snakemake.html").read_text()
     shown = json.loads(page.split("var categories = ")[1].split(";\n")[0])
-    listed = {category: parts["Other"] for category, parts in shown.items()}
+    assert "figures/figure_1.svg" in shown["Figures"]["main"]
+    listed = {category: [file for own in parts.values() for file in own] for category, parts in shown.items()}
     assert listed["Report"] == ["report/report.html"]
     assert {"figures/figure_1.svg", "figures/profiles.svg"} <= set(listed["Figures"])
     assert "results/tables/table_2.csv" in listed["Tables"]

@@ -16,7 +16,7 @@ rule plot_figure:
         **PUBLISHED,
         training_logs=source("report/published/training_logs.csv"),
     output:
-        report("figures/{figure}.svg", category="Figures"),
+        report("figures/{figure}.svg", category="Figures", subcategory=study_of_figure),
         expand("figures/{{figure}}.{kind}", kind=[kind for kind in KINDS if kind != "svg"]),
     log:
         "results/logs/figures/{figure}.log",
@@ -27,7 +27,7 @@ rule plot_figure:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        study=lambda wildcards: FIGURES[wildcards.figure][0],
+        study=study_of_figure,
         view=lambda wildcards: FIGURES[wildcards.figure][1],
         radius=RADIUS,
         code=code("plot_figure"),

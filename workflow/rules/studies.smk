@@ -152,6 +152,10 @@ def claimed_protocols(wildcards):
     return names[:1] if study_of(wildcards) == MAIN else names
 
 
+def study_of_figure(wildcards):
+    return FIGURES[wildcards.figure][0]
+
+
 def tables_drawn(wildcards):
     """The tables that the figures of a study read, by name."""
     study, view = FIGURES[wildcards.figure]
