@@ -1,13 +1,18 @@
+import sys
+
 import imageio_ffmpeg
+import mujoco
 import numpy as np
 import pytest
 from PIL import Image
+from toys import point_mass
 
 from reacher_shaping.evaluation import video
 from reacher_shaping.evaluation.controllers import TUNED_GAINS, reach
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks import rendering
+from reacher_shaping.tasks.base import load_task
 
 SETTINGS = {"mode": "deterministic", "radius": 0.02, "environment": Environment(control_weight=1.0), "root_seed": 0}
 
@@ -101,14 +106,61 @@ def test_rendering_shows_the_tip_where_the_drawing_does():
     opengl = rendering.find_opengl()
     if opengl is None:
         pytest.skip("no OpenGL here")
-    with rendering.rendered(opengl, 200, 0.02) as picture:
+    with rendering.rendered(opengl, 200, "reacher", np.array([*POSITION[2:], 0.001]), 0.02) as picture:
         pixels = picture(POSITION)
         again = picture(POSITION)
     assert green_centre(pixels) == pytest.approx(expected_centre(TIP, 200), abs=5)
     assert (pixels == again).all()
 
 
-def test_a_task_of_which_there_are_no_pictures_is_refused_by_name():
-    settings = SETTINGS | {"environment": Environment(task="pusher")}
-    with pytest.raises(ValueError, match="no pictures of the task pusher; allowed: reacher"):
-        video.evaluation_episode(reach(TUNED_GAINS[1.0]), 0, **settings)
+def still(task):
+    """An actor that asks for nothing."""
+    size = load_task(task).action_size
+    return lambda observation, noise: np.zeros((*observation.shape[:2], size), dtype=np.float32)
+
+
+@pytest.mark.parametrize(("task", "positions"), [("reacher", 4), ("pusher", 11), ("fetch_reach", 15)])
+def test_every_tasks_filmed_episode_is_the_first_of_its_evaluation(task, positions, monkeypatch):
+    record = load_task(task)
+    settings = SETTINGS | {"environment": Environment(task=task, clip_actions=True)}
+    filmed = video.evaluation_episode(still(task), 0, **settings)
+    row = evaluate(still(task), [0], episodes=20, **settings).iloc[0]
+    assert filmed.positions.shape == (record.episode_steps + 1, positions)
+    assert filmed.distances[-1] == row["final_distance"]
+    assert filmed.distances[1:].min() == row["min_distance"]
+    monkeypatch.setattr(video, "find_opengl", lambda: None)
+    if task != "reacher":
+        with pytest.raises(ValueError, match=f"pictures of the task {task} take OpenGL, and none is found"):
+            video.frames(filmed, "a cell")
+
+
+@pytest.mark.parametrize("task", ["pusher", "fetch_reach"])
+def test_goal_is_drawn_where_the_environment_measures_it(task):
+    """With Gymnasium's own bodies: what the distance is measured to lies in the middle of the ball."""
+    filmed = video.evaluation_episode(still(task), 0, **SETTINGS | {"environment": Environment(task=task)})
+    model = load_task(task).model()
+    data = mujoco.MjData(model)
+    data.qpos[:] = filmed.positions[0]
+    mujoco.mj_forward(model, data)
+    moved = data.body("object").xpos if task == "pusher" else data.site("robot0:grip").xpos
+    assert np.linalg.norm(moved - filmed.goal) == pytest.approx(filmed.distances[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("task", ["pusher", "fetch_reach"])
+def test_rendering_of_a_task_shows_the_ball_around_its_goal(task):
+    opengl = rendering.find_opengl()
+    if opengl is None:
+        pytest.skip("no OpenGL here")
+    position = video.evaluation_episode(still(task), 0, **SETTINGS | {"environment": Environment(task=task)})
+    pictures = []
+    for away in (0.0, 9.0):
+        with rendering.rendered(opengl, 96, task, position.goal + away, 0.05) as picture:
+            pictures.append(picture(position.positions[0]).astype(int))
+    marked = np.abs(pictures[0] - pictures[1]).max(-1) > 10
+    assert 5 < marked.sum() < 600, "a ball of 0.05 m is some pixels wide"
+
+
+def test_a_task_of_which_there_are_no_pictures_is_refused_by_name(monkeypatch):
+    monkeypatch.setitem(sys.modules, "reacher_shaping.tasks.point_mass", point_mass)
+    with pytest.raises(ValueError, match="no pictures of the task point_mass"):
+        rendering.view_of("point_mass")

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
+from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.storage.files import replacing
-from reacher_shaping.tasks.base import load_task
-from reacher_shaping.tasks.rendering import Pixels, drawn, find_opengl, rendered
+from reacher_shaping.tasks.base import Lanes, load_task
+from reacher_shaping.tasks.rendering import Pixels, drawn, find_opengl, rendered, view_of
 
 SIZE = 320
 """Width of a video in pixels; its height is SIZE + STRIP, both multiples of 16 for the MP4."""
@@ -37,14 +38,19 @@ class Episode:
     """One episode of one policy.
 
     Attributes:
-        positions: [T + 1, 4] shoulder and elbow angle in rad, target x and y in m; first after the reset.
-        distances: [T + 1] fingertip to target in m.
+        task: its name.
+        positions: [T + 1, Q] of the whole model, first after the reset; Reacher's are shoulder and elbow angle in rad,
+            target x and y in m.
+        goal: [3] m.
+        distances: [T + 1] to the goal in m.
         episode_return: sum of the environment's own reward.
         radius: m; success is a distance of at most `radius` after any step.
         step_seconds: simulated seconds from a position to the next.
     """
 
+    task: str
     positions: NDArray[np.float64]
+    goal: NDArray[np.float64]
     distances: NDArray[np.float64]
     episode_return: float
     radius: float
@@ -56,18 +62,16 @@ def evaluation_episode(
 ) -> Episode:
     """Return the first evaluation episode of a policy; `act` is an actor of S = 1, `seed` its name.
 
-    Raises ValueError for another task than Reacher, of which alone there are pictures.
+    Raises ValueError for a task of which there are no pictures.
     """
-    if environment.task != "reacher":
-        raise ValueError(f"there are no pictures of the task {environment.task}; allowed: reacher")
-    seen: list[NDArray[np.float64]] = []
-    latest: NDArray[np.float64] = np.empty(0)
+    task, view = load_task(environment.task), view_of(environment.task)
+    actions: list[NDArray[np.floating]] = []
 
     def watched(observation: NDArray[np.float64], noise: NDArray[np.float32] | None) -> NDArray[np.floating]:
-        nonlocal latest
-        latest = observation
-        seen.append(observation[0, 0].copy())
-        return act(observation, noise)
+        action = act(observation, noise)
+        limit = task.action_limit if environment.clip_actions else np.inf
+        actions.append(action[0, :1].clip(-limit, limit))
+        return action
 
     row = evaluate(
         watched,
@@ -78,24 +82,47 @@ def evaluation_episode(
         environment=environment,
         root_seed=root_seed,
     ).iloc[0]
-    seen.append(latest[0, 0].copy())  # the lanes' array is overwritten in place: it holds the state after the last step
-    observations = np.stack(seen)
-    angles = np.arctan2(observations[:, 2:4], observations[:, 0:2])
-    distances = np.linalg.norm(observations[:, 8:10], axis=-1)
-    seconds = load_task(environment.task).step_seconds
-    return Episode(np.hstack([angles, observations[:, 4:6]]), distances, float(row["episode_return"]), radius, seconds)
+    draw = task.draw_reset(stream(root_seed, Purpose.EVALUATION_RESETS))
+    lanes = Lanes(task, 1)
+    lanes.reset([draw])
+    moving, distances = [lanes.data.qpos[0].copy()], [lanes.distance[0]]
+    for action in actions:
+        lanes.step(action)
+        moving.append(lanes.data.qpos[0].copy())
+        distances.append(lanes.distance[0])
+    return Episode(
+        task=environment.task,
+        positions=view.positions(np.stack(moving), draw),
+        goal=view.goal(draw),
+        distances=np.array(distances),
+        episode_return=float(row["episode_return"]),
+        radius=radius,
+        step_seconds=task.step_seconds,
+    )
 
 
 def frames(episode: Episode, title: str) -> list[Image.Image]:
-    """Return a picture of every state, with `title` and a running line below: rendered, or drawn without OpenGL."""
-    opengl = find_opengl()
-    pictures = rendered(opengl, SIZE, episode.radius) if opengl else nullcontext(drawn(SIZE, episode.radius))
-    words = [title, f"return {episode.episode_return:.1f}" + ("" if opengl else f"; {_NO_OPENGL}")]
-    font = _fitting_font(words)
-    with pictures as picture:
+    """Return a picture of every state, with `title` and a running line below: rendered, or drawn without OpenGL.
+
+    Raises ValueError where no OpenGL is found for a task that cannot be drawn flat, any but Reacher.
+    """
+    opengl, moved = find_opengl(), view_of(episode.task).moved
+    if not opengl and episode.task != "reacher":
+        raise ValueError(f"pictures of the task {episode.task} take OpenGL, and none is found here; see the README")
+    with (
+        rendered(opengl, SIZE, episode.task, episode.goal, episode.radius)
+        if opengl
+        else nullcontext(drawn(SIZE, episode.radius))
+    ) as picture:
+        words = [title, f"return {episode.episode_return:.1f}" + ("" if opengl else f"; {_NO_OPENGL}")]
+        font = _fitting_font(words)
+        told = [
+            (f"{step * episode.step_seconds:.2f} s: {moved} {1000 * distance:.0f} mm from the target", distance)
+            for step, distance in enumerate(episode.distances)
+        ]
         return [
-            _captioned(picture(position), words, font, step * episode.step_seconds, distance, episode.radius)
-            for step, (position, distance) in enumerate(zip(episode.positions, episode.distances, strict=True))
+            _captioned(picture(position), [*words, now], font, reached=step > 0 and distance <= episode.radius)
+            for step, (position, (now, distance)) in enumerate(zip(episode.positions, told, strict=True))
         ]
 
 
@@ -139,16 +166,13 @@ def _write_mp4(path: Path, images: Sequence[Image.Image]) -> None:
 WRITERS: Mapping[str, Callable[[Path, Sequence[Image.Image]], None]] = {".gif": _write_gif, ".mp4": _write_mp4}
 
 
-def _captioned(
-    pixels: Pixels, words: Sequence[str], font: Font, seconds: float, distance: float, radius: float
-) -> Image.Image:
-    """Return the picture with a strip of text below it; the last line is green while the tip is on the target."""
+def _captioned(pixels: Pixels, words: Sequence[str], font: Font, *, reached: bool) -> Image.Image:
+    """Return the picture with a strip of text below it; the last line is green while the target is reached."""
     image = Image.new("RGB", (SIZE, SIZE + STRIP), "white")
     image.paste(Image.fromarray(pixels))
     canvas = ImageDraw.Draw(image)
-    now = f"{seconds:.2f} s: tip {1000 * distance:.0f} mm from the target"
-    colors = ["black", "black", "#00795c" if distance <= radius and seconds else "#b3261e"]
-    for line, (text, color) in enumerate(zip([*words, now], colors, strict=True)):
+    colors = ["black", "black", "#00795c" if reached else "#b3261e"]
+    for line, (text, color) in enumerate(zip(words, colors, strict=True)):
         canvas.text((6, SIZE + 3 + 20 * line), text, fill=color, font=font)
     return image
 

@@ -41,6 +41,28 @@ class Bounds(NamedTuple):
     """No episode's return is above it, by reward."""
 
 
+class View(NamedTuple):
+    """How pictures of a task are taken; a task without one has none. Training knows nothing of it.
+
+    Attributes:
+        lookat: m, the point in the middle of the picture.
+        distance: m, from there to the camera.
+        azimuth: degrees around the vertical.
+        elevation: degrees, -90 straight down.
+        positions: (positions of the simulated model [..., Q], reset [D]) -> those of the whole model [..., Q'].
+        goal: reset [D] -> m, the goal's place [3], around which the success radius is drawn.
+        moved: what is to come to the goal, in a word.
+    """
+
+    lookat: tuple[float, float, float]
+    distance: float
+    azimuth: float
+    elevation: float
+    positions: Callable[[Array, Array], Array]
+    goal: Callable[[Array], Array]
+    moved: str
+
+
 @dataclass(frozen=True)
 class Task:
     """An environment with its rewards; N lanes, F numbers observed, A of an action, D drawn for a reset, M measured.

@@ -23,7 +23,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from reacher_shaping.tasks.base import Array, Bounds, Data, Task
+from reacher_shaping.tasks.base import Array, Bounds, Data, Task, View
 
 FRAME_SKIP = 20
 STEP_SECONDS = 0.04
@@ -169,4 +169,13 @@ TASK = Task(
     observe=observe,
     rewards={"dense": dense, "sparse": sparse},
     bounds=Bounds(distance=2.0, highest_return={"dense": 0.0, "sparse": 0.0}),  # the arm is 1.1 m long, and some
+)
+VIEW = View(
+    lookat=(1.3, 0.75, 0.55),
+    distance=1.6,
+    azimuth=132,
+    elevation=-14,
+    positions=lambda moving, draw: moving,
+    goal=lambda draw: draw,
+    moved="gripper",
 )

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from reacher_shaping.tasks.base import Array, Bounds, Data, Task, finite_controls, gymnasium_asset
+from reacher_shaping.tasks.base import Array, Bounds, Data, Task, View, finite_controls, gymnasium_asset
 
 NEAR_WEIGHT = 0.5
 """Reward per m from fingertip to puck; the distance of puck and goal counts once."""
@@ -112,4 +112,13 @@ TASK = Task(
     observe=observe,
     rewards={"dense": dense, "sparse": sparse},
     bounds=Bounds(distance=15.0, highest_return={"dense": 0.0, "sparse": 100.0}),  # slides of 10.3 m each way
+)
+VIEW = View(
+    lookat=(0.3, -0.2, -0.3),
+    distance=1.9,
+    azimuth=-90,
+    elevation=-40,
+    positions=lambda moving, draw: moving,
+    goal=lambda draw: np.array([0.45, -0.05, -0.323]),  # pusher_v5.xml's body of the goal, whose slides stay at 0
+    moved="puck",
 )

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from reacher_shaping.tasks.base import Array, Bounds, Data, Task, finite_controls, gymnasium_asset
+from reacher_shaping.tasks.base import Array, Bounds, Data, Task, View, finite_controls, gymnasium_asset
 
 TARGET_ORIGIN = np.array([0.1, -0.1, 0.01])
 """m; position of the target's body in reacher.xml, and the reference of its two slides."""
@@ -136,4 +136,13 @@ TASK = Task(
     rewards={"dense": dense, "sparse": sparse},
     # the arm's 0.21 m and the farthest target's 0.28 m, and some; a reward of 1 at each of 50 steps
     bounds=Bounds(distance=0.5, highest_return={"dense": 0.0, "sparse": 50.0}),
+)
+VIEW = View(
+    lookat=(0.0, 0.0, 0.0),
+    distance=0.25 / np.tan(np.radians(45 / 2)),  # with MuJoCo's field of view, 0.25 m from the centre to an edge
+    azimuth=90,
+    elevation=-90,
+    positions=lambda moving, draw: np.concatenate([moving, np.broadcast_to(draw[2:4], moving.shape)], axis=-1),
+    goal=lambda draw: np.append(draw[2:4], 0.001),
+    moved="tip",
 )

@@ -1,6 +1,6 @@
-"""Pictures of the arm: rendered by MuJoCo without a display, or drawn flat where no OpenGL is found.
+"""Pictures of a task: rendered by MuJoCo without a display; Reacher's are drawn flat where no OpenGL is found.
 
-All pictures look straight down, x to the right and y up, and show the same square of the plane.
+Reacher's look straight down, x to the right and y up, and show the same square of the plane.
 """
 
 import os
@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from reacher_shaping.tasks.reacher import TASK
+from reacher_shaping.tasks.base import View, load_task
 
 Pixels = NDArray[np.uint8]
 Picture = Callable[[NDArray[np.float64]], Pixels]
-"""(shoulder and elbow angle in rad, target x and y in m) [4] -> pixels [size, size, 3]."""
+"""Positions of the whole model -> pixels [size, size, 3]. Reacher's are two angles in rad, and target x and y in m."""
 HALF_WIDTH = 0.25
 """m from the centre to an edge of the picture; the arm is 0.21 m long."""
 OFF = frozenset({"disable", "disabled", "off", "false", "0"})
@@ -30,7 +30,7 @@ OFF = frozenset({"disable", "disabled", "off", "false", "0"})
 _PROBE = """
 import sys, numpy
 from reacher_shaping.tasks.rendering import rendered
-with rendered(sys.argv[1], 16, 0.02) as picture:
+with rendered(sys.argv[1], 16, "reacher", numpy.zeros(3), 0.02) as picture:
     assert picture(numpy.zeros(4)).any()
 """
 _PROBE_SECONDS = 60
@@ -62,34 +62,43 @@ def _works(opengl: str) -> bool:
     return probe.returncode == 0
 
 
+def view_of(task: str) -> View:
+    """Return how pictures of a task are taken. Raises ValueError for a task of which there are none."""
+    view: View | None = getattr(import_module(f"reacher_shaping.tasks.{task}"), "VIEW", None)
+    if view is None:
+        raise ValueError(f"there are no pictures of the task {task}: tasks/{task}.py defines no VIEW")
+    return view
+
+
 @contextmanager
-def rendered(opengl: str, size: int, radius: float) -> Iterator[Picture]:
-    """Give pictures rendered by MuJoCo, of `size` pixels a side, with a disc of `radius` m around the target.
+def rendered(opengl: str, size: int, task: str, goal: NDArray[np.float64], radius: float) -> Iterator[Picture]:
+    """Give pictures rendered by MuJoCo, of `size` pixels a side, with a disc of `radius` m around the `goal` [3] m.
 
     `opengl` is what `find_opengl` found. It is chosen here and not by MuJoCo, which decides at its import.
     """
-    model = TASK.model()
+    view, model = view_of(task), load_task(task).model()
     light = model.vis.headlight  # an even light: MuJoCo's own leaves the floor dark away from the centre
     light.ambient[:], light.diffuse[:], light.specular[:] = 0.7, 0.3, 0.0
     data = mujoco.MjData(model)
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1)
-    camera, options = _camera(model), mujoco.MjvOption()
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nsite + 1)
+    camera, options = _camera(view), mujoco.MjvOption()
+    options.sitegroup[:] = 0  # marks that the environment itself moves; the disc says where the goal is
     window = import_module(f"mujoco.{opengl}").GLContext(size, size)
     with closing(_Freed(window)):
         window.make_current()
         context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         with closing(_Freed(context)):
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
-            view = mujoco.MjrRect(0, 0, size, size)
+            square = mujoco.MjrRect(0, 0, size, size)
 
             def picture(position: NDArray[np.float64]) -> Pixels:
                 data.qpos[:] = position
                 mujoco.mj_forward(model, data)
                 mujoco.mjv_updateScene(model, data, options, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
-                _add_disc(scene, data.body("target").xpos, radius)
-                mujoco.mjr_render(view, scene, context)
+                _add_disc(scene, goal, radius, flat=view.elevation == -90)
+                mujoco.mjr_render(square, scene, context)
                 pixels = np.empty((size, size, 3), dtype=np.uint8)
-                mujoco.mjr_readPixels(pixels, None, view, context)
+                mujoco.mjr_readPixels(pixels, None, square, context)
                 return np.flipud(pixels)
 
             yield picture
@@ -124,20 +133,19 @@ def drawn(size: int, radius: float) -> Picture:
     return picture
 
 
-def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
-    """A camera above the centre, at the height from which its field of view is the square."""
+def _camera(view: View) -> mujoco.MjvCamera:
     camera = mujoco.MjvCamera()
-    camera.lookat[:] = 0
-    camera.azimuth, camera.elevation = 90, -90
-    camera.distance = HALF_WIDTH / np.tan(np.radians(model.vis.global_.fovy) / 2)
+    camera.lookat[:] = view.lookat
+    camera.azimuth, camera.elevation, camera.distance = view.azimuth, view.elevation, view.distance
     return camera
 
 
-def _add_disc(scene: mujoco.MjvScene, centre: NDArray[np.float64], radius: float) -> None:
-    """Add a translucent disc on the floor under the target: where the fingertip has reached it."""
-    size, place = np.array([radius, 0.0005, 0.0]), np.array([centre[0], centre[1], 0.001])
+def _add_disc(scene: mujoco.MjvScene, goal: NDArray[np.float64], radius: float, *, flat: bool) -> None:
+    """Add what is translucent around the goal: a disc in the plane, or a ball in space."""
+    kind = mujoco.mjtGeom.mjGEOM_CYLINDER if flat else mujoco.mjtGeom.mjGEOM_SPHERE
+    size = np.array([radius, 0.0005, 0.0]) if flat else np.full(3, radius)
     color = np.array([0.9, 0.2, 0.2, 0.35], dtype=np.float32)
-    mujoco.mjv_initGeom(scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_CYLINDER, size, place, np.eye(3).ravel(), color)
+    mujoco.mjv_initGeom(scene.geoms[scene.ngeom], kind, size, goal, np.eye(3).ravel(), color)
     scene.ngeom += 1
 
 
