@@ -12,6 +12,16 @@ PLUGIN := $(if $(findstring slurm,$(PROFILE)),python -c 'import snakemake_execut
 	|| python -m pip install --quiet --editable '.[slurm]')
 SNAKEMAKE := snakemake --workflow-profile $(PROFILE) $(if $(VERBOSE),--quiet host)
 
+# The reference run's report, from the tables that the repository keeps.
+define REFERENCE_REPORT
+	@mkdir -p build/reference/results
+	@rm -rf $(addprefix build/reference/results/,peers.parquet seed_curves.parquet run_radii.parquet policies search experiments)
+	@cp -rp report/reference/* build/reference/results/
+	@test -d build/reference/results/experiments/sparse || cp -rp report/sparse_run build/reference/results/experiments/sparse
+	@python workflow/unlock.py build/reference
+	$(SNAKEMAKE) --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report -- report/reference.html
+endef
+
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .DEFAULT_GOAL := help
@@ -61,12 +71,7 @@ ifneq ($(wildcard results/runs.parquet),)
 		-- report/report.html ro-crate-metadata.json
 	@echo "The report: $(CURDIR)/report/report.html"
 else
-	@mkdir -p build/reference/results
-	@rm -rf build/reference/results/peers.parquet build/reference/results/experiments
-	@cp -rp report/reference/* build/reference/results/
-	@test -d build/reference/results/experiments/sparse || cp -rp report/sparse_run build/reference/results/experiments/sparse
-	@python workflow/unlock.py build/reference
-	$(SNAKEMAKE) --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report -- report/reference.html
+	$(REFERENCE_REPORT)
 	@echo "The report of the reference run: $(CURDIR)/build/reference/report/reference.html"
 endif
 
@@ -82,8 +87,10 @@ archive: $(READY) ## report, tables, figures, runs and manifests in one zip, rea
 verify: $(READY) ## are the study's files as they were made? recomputes the checksums
 	@python workflow/verify.py
 
-reference: $(READY) ## make the run in results/ the reference run: report/reference/ and the README's headline; FORCE=1 whatever is lost
+reference: $(READY) ## make the run in results/ the reference run: its tables, its report to read and the README's headline; FORCE=1 whatever is lost
 	@python workflow/keep_reference.py $(if $(FORCE),--force)
+	$(REFERENCE_REPORT)
+	@python workflow/keep_reference.py --report
 
 test: $(READY) ## the tests
 	python -m pytest --numprocesses logical --dist loadfile

@@ -28,6 +28,13 @@ def test_first_screen_has_the_commands():
     assert all(f"make {target}" in first for target in ("reproduce", "test", "quick"))
 
 
+def test_first_screen_leads_to_a_report_that_needs_no_building():
+    first = "\n".join(README.splitlines()[:25])
+    for target in ("report/site/report.pdf", "report/site/index.html"):
+        assert f"]({target})" in first
+        assert (ROOT / target).exists()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_links_lead_to_files(page):
     targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))

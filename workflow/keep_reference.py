@@ -6,6 +6,11 @@
 
 keeps the policies of `results/policies` alone, and leaves all else of the reference run as it is.
 
+    python workflow/keep_reference.py --report
+
+keeps the report of the reference run, as `make report` builds it where there are no results, in `report/site`: one page
+and one PDF to read without building anything, and for a static host to serve as they are.
+
 The folder is made anew beside the old one and takes its place whole. Ends with 1, and changes nothing, where something
 would be lost or a block cannot be traced to a commit; --force keeps the run all the same.
 """
@@ -24,7 +29,7 @@ from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.settings import outputs
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.study import MAIN, Study, block_name, load_study, read_settings, settings_hash
-from reacher_shaping.storage.files import ArtifactError, check_seal, read_json, write_json, write_text
+from reacher_shaping.storage.files import ArtifactError, check_seal, read_json, write_bytes, write_json, write_text
 from reacher_shaping.storage.provenance import require_asked
 from reacher_shaping.storage.reference import (
     POLICIES,
@@ -38,6 +43,7 @@ from reacher_shaping.storage.reference import (
 )
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
+BUILT, SITE = Path("build/reference/report"), Path("report/site")
 FIGURE = "headline.svg"
 
 
@@ -81,7 +87,14 @@ def main() -> None:
     parser.add_argument("overlay", nargs="*", help="a YAML file laid over config.yaml")
     parser.add_argument("--policies", action="store_true", help="keep its policies alone")
     parser.add_argument("--force", action="store_true", help="whatever is lost by it")
+    parser.add_argument("--report", action="store_true", help="keep its report alone")
     options = parser.parse_args()
+    if options.report:
+        for built, kept in (("site/index.html", "index.html"), ("reference.pdf", "report.pdf")):
+            check_seal(BUILT / built)
+            write_bytes(SITE / kept, (BUILT / built).read_bytes())
+        print(f"The report of the reference run, to be read: {SITE}")
+        return
     if options.policies:
         keep_policies(RESULTS, KEPT, KEPT)
         write_json(KEPT / "manifest.json", read_json(KEPT / "manifest.json") | {"tables": checksums(KEPT)})

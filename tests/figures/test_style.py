@@ -15,7 +15,7 @@ import synthetic
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from reacher_shaping.figures import interactive, paper, parts
+from reacher_shaping.figures import interactive, paper, parts, style
 from reacher_shaping.figures.style import LOOKS, SPARE_COLORS, save, to_bytes, variant_color
 from reacher_shaping.labels import variant_label, variant_order
 
@@ -93,6 +93,11 @@ def test_paths_are_kept_short_and_numbers_in_text_whole():
     assert len(picture) < 60_000
     undefined = to_bytes(paper.figure_3(synthetic.correlation(r=(0.123, 0.9, 0, 0, 0, 0))), "svg")
     assert b"0.12" in undefined
+
+
+def test_a_path_made_short_goes_through_the_same_points():
+    long = b"M 1.26 2.0 \nL -3.04 4 \nL 5.55 6 \nC 1 2 3 4 5.19 6 \nL 7.0 8 \nL 9 10 \nz\nM 1 1 \nL 2 2 \n"
+    assert style._short(long) == b"M 1.3 2 -3 4 5.5 6 C 1 2 3 4 5.2 6 L 7 8 9 10 z M 1 1 2 2"
 
 
 def test_svg_turns_dark_for_readers_who_ask_for_it(figure):

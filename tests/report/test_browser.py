@@ -81,10 +81,14 @@ def test_dark_readers_get_a_dark_page(visit):
 
 def test_a_row_of_the_claims_shows_value_and_both_verdicts_on_a_phone(visit):
     page = visit(PHONE)
-    for part in (".measured", ".badge >> nth=0", ".badge >> nth=1"):
-        box = page.locator(f"#C1 summary {part}").first.bounding_box()
+    boxes = [
+        page.locator(f"#C1 summary {part}").first.bounding_box()
+        for part in (".measured", ".verdict >> nth=0", ".badge >> nth=0", ".verdict >> nth=1", ".badge >> nth=1")
+    ]
+    for box in boxes:
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= PHONE[0]
+    assert boxes[2]["x"] + boxes[2]["width"] <= boxes[4]["x"], "one verdict does not cover the other"
 
 
 def test_first_column_stays_when_a_table_is_moved_on_a_phone(visit):

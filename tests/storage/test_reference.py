@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import synthetic
+import torch
 
 from reacher_shaping.analysis.agreement import agreement, compare, compare_verdicts, verdicts_agree
 from reacher_shaping.analysis.scores import profiles_frame
@@ -19,7 +20,8 @@ from reacher_shaping.report.loader import load
 from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import ArtifactError, read_table, write_json, write_table, write_text
-from reacher_shaping.storage.reference import checksums, keep_tables, objections, replaced
+from reacher_shaping.storage.policy_format import read_policy, weights_checksum, write_policy
+from reacher_shaping.storage.reference import POLICIES, checksums, keep_policies, keep_tables, objections, replaced
 from reacher_shaping.storage.tables import TABLES, of_study
 
 ROOT = Path(__file__).parents[2]
@@ -152,6 +154,65 @@ def test_verdicts_of_two_studies_stand_side_by_side():
     assert compared["same"].to_list() == [True, False, True]
     assert verdicts_agree(compared) == "Of 3 verdicts 2 are the same, 2.2 were to be expected. Others: C2."
     assert verdicts_agree(compared.head(0)) == "No claim is tested in both."
+
+
+def shown(folder, **values):
+    """The policies that a report shows, of one run each whose weights are all of a value, with what is told of them."""
+    summary = {"controller": {"gains": [1.0, 0.1, 3.0]}}
+    for name, value in values.items():
+        weights = {"log_std": torch.full((1, 2), float(value))}
+        write_policy(folder / POLICIES / f"{name}.pt", [4], weights, {})
+        told = {"cell": f"paper-{name}", "seed": 4, "git": {"commit": "c" * 40, "dirty": False}, "code": "d"}
+        summary[name] = told | {"weights": weights_checksum(weights)}
+    write_json(folder / POLICIES / "policies.json", summary)
+    return folder
+
+
+def test_policies_are_kept_with_seed_commit_and_checksum_and_those_of_before_stay(tmp_path):
+    before, results = shown(tmp_path / "before", none=0, tuned=1), shown(tmp_path / "results", none=2)
+    keep_policies(results, tmp_path / "kept", before)
+    summary = json.loads((tmp_path / "kept" / POLICIES / "policies.json").read_text())
+    assert set(summary) == {"controller", "none", "tuned"}
+    for name, value in (("none", 2), ("tuned", 1)):
+        kept = read_policy(tmp_path / "kept" / POLICIES / f"{name}.pt")
+        assert kept.weights["log_std"].tolist() == [[value, value]]
+        assert summary[name]["seed"] == kept.seeds[0] == 4
+        assert summary[name]["weights"] == weights_checksum(kept.weights)
+        assert summary[name]["git"] == {"commit": "c" * 40, "dirty": False}
+
+
+@pytest.mark.parametrize("changed", ["before", "results"])
+def test_a_policy_that_is_not_the_one_told_of_is_refused_and_nothing_is_kept(tmp_path, changed):
+    folders = {name: shown(tmp_path / name, none=0, tuned=1) for name in ("before", "results")}
+    write_policy(folders[changed] / POLICIES / "tuned.pt", [4], {"log_std": torch.full((1, 2), 7.0)}, {})
+    with pytest.raises(ArtifactError, match=r"tuned\.pt: is not the policy that"):
+        keep_policies(folders["results"], tmp_path / "kept", folders["before"])
+    assert not (tmp_path / "kept").exists()
+
+
+@needs_reference
+def test_each_kept_policy_tells_its_run_and_commit_and_is_the_one_told_of():
+    summary = json.loads((KEPT / POLICIES / "policies.json").read_text())
+    files = {path.stem for path in (KEPT / POLICIES).glob("*.pt")}
+    assert files == {name for name, told in summary.items() if "weights" in told}
+    for name in files:
+        told, kept = summary[name], read_policy(KEPT / POLICIES / f"{name}.pt")
+        assert told["weights"] == weights_checksum(kept.weights)
+        assert kept.seeds == [told["seed"]]
+        if name != "untrained":
+            assert re.fullmatch(r"[0-9a-f]{40}", told["git"]["commit"])
+            assert re.fullmatch(r"[0-9a-f]{64}", told["code"])
+
+
+@needs_reference
+def test_report_to_read_is_that_of_the_reference_run():
+    record = json.loads((KEPT / "manifest.json").read_text())
+    commit = record["blocks"][0]["git"]["commit"][:12]
+    page, paper = ((KEPT.parent / "site" / name).read_bytes() for name in ("index.html", "report.pdf"))
+    for words in (f"code {commit}", f"settings {record['settings_hash'][:12]}"):
+        assert words in page.decode()
+        assert words.encode() in paper, "the PDF's keywords"
+    assert b'href="notebooks/' not in page, "no notebook lies beside it"
 
 
 def kept_folder(folder, *, runs=2, files=("runs.parquet",), dirty=False, codes=("a", "a")):

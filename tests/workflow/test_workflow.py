@@ -12,6 +12,7 @@ from reacher_shaping import processor
 from reacher_shaping.settings.study import read_settings
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import read_json, read_table, sha256
+from reacher_shaping.storage.policy_format import read_policy, weights_checksum
 
 FURTHER = {
     "seeds": 2,
@@ -121,7 +122,7 @@ def test_whole_study_makes_every_file_of_the_contract(project):
     files = ["policy.pt", "progress.parquet", "episodes.parquet", "manifest.json"]
     expected = [f"{block}/{file}" for block in blocks for file in files]
     expected += [f"{block}/monitor/{block[-1]}.monitor.csv" for block in blocks]
-    expected += [f"results/{name}.parquet" for name in ("runs", "cells", "controllers")]
+    expected += [f"results/{name}.parquet" for name in ("runs", "cells", "controllers", "seed_curves")]
     expected += [f"results/{name}.csv" for name in ("correlation", "claims")]
     expected += [f"results/tables/table_{number}.{kind}" for number in (1, 2, 3) for kind in ("csv", "md")]
     expected += [f"figures/figure_{number}.{kind}" for number in (1, 2, 3, 4) for kind in ("svg", "pdf")]
@@ -129,6 +130,17 @@ def test_whole_study_makes_every_file_of_the_contract(project):
     expected += ["results/notebooks/story.ipynb", "report/report.html", "ro-crate-metadata.json"]
     missing = [name for name in expected if not (project.folder / name).exists()]
     assert missing == []
+
+
+def test_policy_of_the_page_is_the_first_run_of_its_cell_and_tells_the_commit_of_its_training(project):
+    folder = project.folder / "results/policies"
+    shown, block = read_json(folder / "policies.json"), project.folder / f"{NONE}/seeds0-0"
+    trained, kept = read_policy(block / "policy.pt"), read_policy(folder / "none.pt")
+    training = read_json(block / "training.json")
+    assert kept.seeds == trained.seeds == [shown["none"]["seed"]]
+    assert shown["none"]["weights"] == weights_checksum(kept.weights) == weights_checksum(trained.weights)
+    assert (shown["none"]["git"], shown["none"]["code"]) == (training["git"], training["code"])
+    assert weights_checksum(read_policy(folder / "untrained.pt").weights) == shown["untrained"]["weights"]
 
 
 def test_tables_have_the_columns_of_the_contract(project):

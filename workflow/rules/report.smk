@@ -77,6 +77,7 @@ use rule build_report as build_reference_report with:
     output:
         page="report/reference.html",
         paper="report/reference.pdf",
+        alone="report/site/index.html",
     log:
         "results/logs/build_reference_report.log",
     benchmark:

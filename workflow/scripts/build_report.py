@@ -1,6 +1,7 @@
 """Build the report, one HTML file and one PDF, from everything the study made."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from job import logged
@@ -49,4 +50,6 @@ with logged(snakemake):
         template=Path(given.template),
     )
     write_text(snakemake.output.page, html.build(inputs))
+    if hasattr(snakemake.output, "alone"):  # the page where no notebook lies beside it
+        write_text(snakemake.output.alone, html.build(replace(inputs, notebooks=[])))
     write_bytes(snakemake.output.paper, pdf.build(inputs))

@@ -162,14 +162,21 @@ def empty_figure() -> Figure:
 
 @look()
 def to_bytes(figure: Figure, kind: str) -> bytes:
-    """The figure as `svg`, `pdf` or `png`; the same figure gives the same bytes. Paths are kept to 0.01 points."""
+    """The figure as `svg`, `pdf` or `png`; the same figure gives the same bytes. Paths are kept to 0.1 points."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, metadata=METADATA[kind])
     content = buffer.getvalue()
     if kind == "svg":
-        content = re.sub(rb' d="[^"]*"', lambda path: re.sub(rb"(\.\d\d)\d+", rb"\1", path[0]), content)
+        content = re.sub(rb'(?<= d=")[^"]*', lambda path: _short(path[0]), content)
         content = content.replace(b"<defs>", DARK.encode() + b"\n <defs>", 1)
     return content
+
+
+def _short(path: bytes) -> bytes:
+    """A path of an SVG in one line: numbers with one decimal, and the points of a run of lines without their letter."""
+    path = re.sub(rb"-?\d+\.\d+", lambda number: b"%g" % round(float(number[0]), 1), path)
+    path = b" ".join(path.split())
+    return re.sub(rb"(?<=[ML] )[^A-Za-z]*(?:L [^A-Za-z]*)+", lambda lines: lines[0].replace(b"L ", b""), path)
 
 
 def save(figure: Figure, stem: Path, kinds: tuple[str, ...] = ("svg", "pdf", "png")) -> list[Path]:

@@ -57,6 +57,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
     }
     return {
         "title": say("page.title"),
+        "keywords": computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol),
         "facts": " · ".join(computation.facts(cells, inputs.manifests, inputs.settings_hash, protocol)),
         "toy": computation.toy(cells),
         "lead": to_typst(first.lead),

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reacher_shaping.storage.files import (
-    check_seal,
+    ArtifactError,
     read_json,
     read_table,
     sha256,
@@ -17,6 +17,7 @@ from reacher_shaping.storage.files import (
     write_json,
     write_table,
 )
+from reacher_shaping.storage.policy_format import read_policy, weights_checksum
 from reacher_shaping.storage.tables import TABLES
 
 POLICIES = "policies"
@@ -100,19 +101,22 @@ def keep_tables(results: Path, kept: Path, names: Iterable[str]) -> None:
 def keep_policies(results: Path, kept: Path, before: Path) -> None:
     """Copy the policies that a report shows, of `results`, into the folder `kept`, and those of `before` that it lacks.
 
-    So those of a study that was not trained here stay. Raises ArtifactError for a damaged file.
+    So those of a study that was not trained here stay. Raises ArtifactError, and writes nothing, for a policy that is
+    not the one that its summary tells of.
     """
     shown: dict[str, Any] = {}
+    files: dict[str, bytes] = {}
     for folder in (before / POLICIES, results / POLICIES):
         summary = folder / "policies.json"
-        if not summary.exists():
-            continue
-        found = read_json(summary)
-        for name in found:
-            if (folder / f"{name}.pt").exists():
-                check_seal(folder / f"{name}.pt")
-                write_bytes(kept / POLICIES / f"{name}.pt", (folder / f"{name}.pt").read_bytes())
+        found = read_json(summary) if summary.exists() else {}
+        for name, told in found.items():
+            path = folder / f"{name}.pt"
+            if "weights" in told and weights_checksum(read_policy(path).weights) != told["weights"]:
+                raise ArtifactError(path, f"is not the policy that {summary} tells of")
+            files |= {path.name: path.read_bytes()} if path.exists() else {}
         shown |= found
+    for file, content in files.items():
+        write_bytes(kept / POLICIES / file, content)
     if shown:
         write_json(kept / POLICIES / "policies.json", shown)
 
