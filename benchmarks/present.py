@@ -26,8 +26,8 @@ TITLES = {
     "jobs": "A training job in a fresh process",
     "ladder": "What each idea brings",
     "ladder gain": "Gain of each idea over the rung before it",
-    "seeds per block": "Cost against seeds per block",
-    "budget": "Cost against budget",
+    "seeds per block": "Speed against seeds per block",
+    "budget": "Time against budget",
     "workflow": "Planning the workflow",
 }
 
@@ -141,7 +141,7 @@ def number(value: float) -> str:
 
 
 def draw(measures: Sequence[Measure], path: Path) -> None:
-    """Draw the peers, the ladder and the cost of blocks, as far as they were measured."""
+    """Draw the peers, the ladder, the speed of blocks and the time of budgets, as far as they were measured."""
     rates = [row for row in measures if row.part == "training" and row.unit == "steps/s"]
     base = next((row.value for row in rates if row.name == "Stable-Baselines3"), 1.0)
     over = [replace(row, value=row.value / base, low=row.low / base, high=row.high / base) for row in rates]

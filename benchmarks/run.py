@@ -242,7 +242,7 @@ def measure_ladder(size: Size) -> Iterator[Measure]:
 
 
 def measure_scaling(size: Size) -> Iterator[Measure]:
-    """Cost against seeds per block and against budget."""
+    """Speed against seeds per block, and time against budget."""
     cell = size.cell()
     rates = take_turns({str(seeds): training(cell, seeds) for seeds in size.seeds}, size.repeats)
     for seeds in size.seeds:

@@ -1,5 +1,6 @@
 """The benchmark runs, and what it compares with computes the same."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -126,6 +127,17 @@ def test_readme_says_what_was_measured():
     sentence = present.readme_sentence(pd.read_csv(BENCHMARKS / "results.csv"))
     assert sentence in page
     assert present.put_sentence(page, "Fast.") == page.replace(sentence, "Fast.")
+
+
+def test_steps_a_second_are_called_a_speed_and_no_cost():
+    import present
+
+    table = pd.read_csv(BENCHMARKS / "results.csv")
+    drawn = (BENCHMARKS / "results.svg").read_text(encoding="utf-8")
+    for part in ("training", "ladder", "seeds per block", "budget"):
+        title, units = present.TITLES[part], table.loc[table["part"] == part, "unit"]
+        assert title in drawn
+        assert not (units.str.contains("steps/s").any() and re.search("cost|time", title, re.IGNORECASE)), title
 
 
 def test_quick_benchmark_writes_its_table_and_plot(tmp_path):
