@@ -158,7 +158,7 @@ def test_verdicts_of_two_studies_stand_side_by_side():
 
 def shown(folder, **values):
     """The policies that a report shows, of one run each whose weights are all of a value, with what is told of them."""
-    summary = {"controller": {"gains": [1.0, 0.1, 3.0]}}
+    summary: dict[str, dict] = {"controller": {"gains": [1.0, 0.1, 3.0]}}
     for name, value in values.items():
         weights = {"log_std": torch.full((1, 2), float(value))}
         write_policy(folder / POLICIES / f"{name}.pt", [4], weights, {})
