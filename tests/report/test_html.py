@@ -269,6 +269,13 @@ def test_first_screen_leads_to_the_arm(inputs):
     assert "#arm" not in Page(html.build(_changed(inputs, policies=None))).links
 
 
+def test_the_main_study_is_introduced_by_its_title_and_question_as_the_others_are(inputs):
+    headings = {"main": {"title": "Does it help?", "question": "With <several> seeds.", "seeds": 3}}
+    told = html.build(_changed(inputs, headings=headings))
+    assert "<p>Does it help? With &lt;several&gt; seeds.</p>" in told
+    assert "Does it help?" not in html.build(inputs)
+
+
 def test_toy_runs_are_marked(tmp_path, study, page):
     toy = Page(
         html.build(report_inputs.make(tmp_path, study, synthetic.TOY_GRID, 2, only=("cells", "runs"), figures={}))

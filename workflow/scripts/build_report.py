@@ -9,6 +9,7 @@ from job import logged
 from reacher_shaping.analysis import sanity
 from reacher_shaping.report import html, pdf
 from reacher_shaping.report.loader import load
+from reacher_shaping.settings.study import MAIN
 from reacher_shaping.storage.files import ArtifactError, read_json, write_bytes, write_text
 from reacher_shaping.storage.provenance import differing, require_asked
 
@@ -45,7 +46,7 @@ with logged(snakemake):
         media=[Path(path) for path in given.media],
         notebooks=[Path(path) for path in given.notebooks],
         policies=next((Path(path) for path in given.policies), None),
-        headings=now["experiments"],
+        headings={MAIN: now, **now["experiments"]},
         manifests=[block for record in records for block in record.get("blocks", [record])],
         template=Path(given.template),
     )

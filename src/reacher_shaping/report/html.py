@@ -56,7 +56,7 @@ class Inputs:
 
     `settings` holds the resolved settings; `study` the tables; `figures` maps names such as `figure_1` to SVG files, in
     the order to show; `manifests` are those of the study's blocks; `headings` has the `title` and `question` of each
-    further study; `policies` is the summary of the policies that the page lets its reader play.
+    study; `policies` is the summary of the policies that the page lets its reader play.
     """
 
     settings: Mapping[str, Any]
@@ -121,6 +121,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
         "evaluation": say(
             "page.evaluation", episodes=f"{inputs.settings['evaluation']['episodes']:,}", radius=_radius(inputs)
         ),
+        "asked": " ".join(headed(inputs, MAIN).values()),
         "settings": settings_grid(inputs.settings, set(cells["protocol"])),
         "departures": departures_grid(inputs.settings),
         "grid": study_grid(cells),
@@ -156,7 +157,7 @@ def contents(inputs: Inputs) -> dict[str, Any]:
 
 
 def headed(inputs: Inputs, study: str) -> dict[str, str]:
-    """Title and question of a further study, as far as they are known."""
+    """Title and question of a study, as far as they are known."""
     own = inputs.headings.get(study, {})
     return {name: own[name] for name in ("title", "question") if own.get(name)}
 
