@@ -24,6 +24,7 @@ from reacher_shaping.report.summary import summary
 from reacher_shaping.report.text import entry
 from reacher_shaping.settings.study import load_study
 from reacher_shaping.storage.files import ArtifactError
+from reacher_shaping.storage.reference import read_tables
 
 ROOT = Path(__file__).parents[2]
 LOADING = ("img", "script", "link", "iframe", "video", "source", "object", "embed", "audio")
@@ -338,6 +339,21 @@ def test_first_screen_counts_comparisons_beyond_chance_and_gives_the_effect(inpu
     first = summary(_changed(inputs, {"comparisons": changed}).study).answers[0]
     assert "3 of 21 settings differ beyond chance" in first.because
     assert "Success changes by \N{MINUS SIGN}2.0 [\N{MINUS SIGN}5.0, 1.0] points" in first.because
+
+
+@pytest.mark.parametrize(
+    ("verdict", "short"), [("supported", "Yes."), ("contradicted", "No."), ("open", "Not decided.")]
+)
+def test_first_screen_says_when_shaping_helps_by_the_first_hypothesis_on_sparse_rewards(inputs, verdict, short):
+    assert not [answer for answer in summary(inputs.study).answers if answer.link == "sparse"], "without such a study"
+    sparse = read_tables(ROOT / "report/sparse_run")
+    judged = sparse["hypotheses"].copy()
+    judged.loc[0, ["verdict", "solved_a", "solved_b"]] = [verdict, 0.7, 0.2]
+    experiments = {"sparse": {**sparse, "hypotheses": judged}}
+    study = dataclasses.replace(inputs.study, experiments={**inputs.study.experiments, **experiments})
+    (answer,) = (answer for answer in summary(study).answers if answer.link == "sparse")
+    assert (answer.short, answer.because) == (short, "7 of 10 runs then learn, 2 without.")
+    assert answer.more == f"Of 9 hypotheses these runs decide {0 if verdict == 'open' else 1}."
 
 
 def test_picture_gives_no_interval_to_what_was_chosen_for_being_the_highest(inputs):

@@ -25,12 +25,13 @@ Row = Mapping[Any, Any]
 
 @dataclass(frozen=True)
 class Answer:
-    """A question, the short answer to it, the sentence with the number, and where the evidence is."""
+    """A question, the short answer to it, the sentence with the number, where the evidence is, and what a page adds."""
 
     question: str
     short: str
     because: str
     link: str
+    more: str = ""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def _span(counts: Sequence[int]) -> str:
 
 def answers(study: Study, protocol: str | None = None) -> list[Answer]:
     """An answer to each question that the tables can tell."""
-    makers = {"potential": _by_family, "solve": _solved}
+    makers = {"potential": _by_family, "sparse": _by_hypothesis, "solve": _solved}
     found = (makers.get(name, _by_claim)(name, study, protocol) for name in entry("questions"))
     return [answer for answer in found if answer]
 
@@ -124,6 +125,19 @@ def _by_family(name: str, study: Study, protocol: str | None) -> Answer | None:
     return Answer(words["ask"], say("short.apart" if apart else "short.same"), because, words["link"])
 
 
+def _by_hypothesis(name: str, study: Study, protocol: str | None) -> Answer | None:
+    """The answer that the first hypothesis of a further study gives, in runs that learned."""
+    words = entry(f"questions.{name}")
+    table = study.experiments.get(words["link"], {}).get("hypotheses")
+    if table is None:
+        return None
+    row, decided = table.iloc[0], int((table["verdict"] != "open").sum())
+    counts = {side: f"{row['runs'] * row[f'solved_{side}']:.0f}" for side in ("a", "b")}
+    because = say(f"questions.{name}.reason", **counts, runs=f"{row['runs']:.0f}")
+    more = say(f"questions.{name}.more", decided=decided, hypotheses=len(table))
+    return Answer(words["ask"], say(f"short.{row['verdict']}"), because, words["link"], more)
+
+
 def _solved(name: str, study: Study, protocol: str | None) -> Answer | None:
     """Whether PPO with settings of its own solves the task, and which switch did most for it."""
     words = entry(f"questions.{name}")
@@ -132,9 +146,9 @@ def _solved(name: str, study: Study, protocol: str | None) -> Answer | None:
         return None
     switch = _best_switch(study)
     texts = {"rate": _percent(row["success_rate"]), "final": _percent(row["final_success_rate"])}
-    more = say(f"questions.{name}.switch", switch=switch) if switch else ""
+    more = say(f"questions.{name}.more", switch=switch) if switch else ""
     short = say("short.solved" if row["success_rate"] > 0.9 else "short.unsolved")
-    return Answer(words["ask"], short, say(f"questions.{name}.reason", **texts, switch=more), words["link"])
+    return Answer(words["ask"], short, say(f"questions.{name}.reason", **texts), words["link"], more)
 
 
 def _best(study: Study) -> Row | None:
