@@ -10,10 +10,9 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from study import HERE, study
+from study import HERE, end_with_reader, study
 
 from reacher_shaping.jobs.blocks import Block, Codes, State, blocks, state_on_disk
-from reacher_shaping.settings.base import ConfigError
 
 
 def word(states: Counter[State]) -> str:
@@ -48,7 +47,5 @@ if __name__ == "__main__":
     parser.add_argument("words", nargs="*", help="parts of the names to list")
     parser.add_argument("--directory", type=Path, default=Path(), help="the study's folder")
     parser.add_argument("--configfile", type=Path, nargs="+", default=[], help="settings laid over config.yaml")
-    try:
-        main(parser.parse_args())
-    except ConfigError as error:
-        sys.exit(f"ConfigError: {error}")
+    end_with_reader()
+    main(parser.parse_args())

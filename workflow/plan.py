@@ -11,7 +11,7 @@ import sys
 from collections import Counter, defaultdict
 from pathlib import Path
 
-from study import HERE, study
+from study import HERE, end_with_reader, study
 
 from reacher_shaping.jobs import cost
 from reacher_shaping.jobs.blocks import blocks
@@ -86,6 +86,7 @@ if __name__ == "__main__":
     parser.add_argument("--directory", type=Path, default=Path(), help="the study's folder")
     parser.add_argument("--configfile", type=Path, nargs="+", default=[], help="settings laid over config.yaml")
     parser.add_argument("--cores", type=int, default=0, help="jobs at a time; this machine's cores without it")
+    end_with_reader()
     asked = parser.parse_args()
     asked.cores = asked.cores or len(os.sched_getaffinity(0))
     main(asked)

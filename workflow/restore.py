@@ -26,7 +26,6 @@ from verify import crate_problems
 from reacher_shaping.jobs import folder_lock, regroup
 from reacher_shaping.jobs.blocks import Block, Codes, blocks, state, state_on_disk
 from reacher_shaping.jobs.regroup import Part
-from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.study import Study
 from reacher_shaping.storage.crate import METADATA, checksums
 from reacher_shaping.storage.files import ArtifactError, read_json, seal_of
@@ -172,5 +171,5 @@ if __name__ == "__main__":
     parser.add_argument("--configfile", type=Path, nargs="+", default=[], help="settings laid over config.yaml")
     try:
         main(parser.parse_args())
-    except (ArtifactError, ConfigError, folder_lock.FolderTakenError) as error:
+    except (ArtifactError, folder_lock.FolderTakenError) as error:
         sys.exit(str(error))

@@ -4,6 +4,8 @@ import os
 import re
 import shutil
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -44,6 +46,25 @@ def test_a_part_of_the_study_that_is_done_is_asked_for_again_without_a_word_of_p
     done = longer_study.copied(tmp_path / "study").snakemake("--until", "evaluate_block")
     assert done.returncode == 0, done.stderr
     assert "left" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["cells.py", "plan.py", "restore.py ."])
+def test_a_config_that_is_not_allowed_ends_every_command_with_one_line(project, command):
+    name, *arguments = command.split()
+    with project.replaced("config.yaml", (project.folder / "config.yaml").read_text() + "\nsedes: 3\n"):
+        done = project.python(f"workflow/{name}", *arguments)
+    assert done.returncode == 1
+    assert re.fullmatch(r"ConfigError: .*sedes.*\n", done.stderr)
+
+
+def test_a_reader_that_has_enough_of_the_cells_is_no_error(project):
+    command = f"{sys.executable} workflow/cells.py | true; exit ${{PIPESTATUS[0]}}"
+    environment = os.environ | {"PYTHONPATH": str(project.folder / "src"), "PYTHONUNBUFFERED": "1"}
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=project.folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stderr == ""
+    assert done.returncode in (0, 128 + signal.SIGPIPE), "ended by the closed pipe, or before it was"
 
 
 def test_cells_of_other_settings_or_code_are_told(project, toy_settings):
