@@ -17,6 +17,7 @@ define REFERENCE_REPORT
 	@mkdir -p build/reference/results
 	@rm -rf $(addprefix build/reference/results/,peers.parquet seed_curves.parquet run_radii.parquet policies search experiments)
 	@cp -rp report/reference/* build/reference/results/
+	@mkdir -p build/reference/results/experiments
 	@test -d build/reference/results/experiments/sparse || cp -rp report/sparse_run build/reference/results/experiments/sparse
 	@python workflow/unlock.py build/reference
 	$(SNAKEMAKE) --directory build/reference --allowed-rules $(FROM_TABLES) build_reference_report -- report/reference.html

@@ -352,3 +352,11 @@ def test_schema_imports_neither_torch_nor_numpy():
         "import sys, reacher_shaping.settings.study; sys.exit(bool({'torch', 'numpy', 'pandas'} & sys.modules.keys()))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_a_learned_potential_that_would_see_beyond_a_terminal_end_is_refused():
+    row = {"protocol": "paper", "variants": ["learned"], "budgets": [500_000]}
+    config = read_settings("config.yaml") | {"grid": [row], "experiments": {}}
+    with pytest.raises(ConfigError, match=r"grid: cell paper-learned-\S+ learns a potential beyond an episode's end"):
+        load_study(config)
+    load_study(config | {"grid": [row | {"protocol": "sparse20"}]})

@@ -13,7 +13,7 @@ from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.settings.parts import Evaluation
 
 EPISODE_STEPS = 50
-"""Of every task so far; its record says so too, but would load the simulation."""
+"""Of Reacher and FetchReach; a task's record says so too, but would load the simulation. Pusher's 100 count as 50."""
 
 MODES = 2
 """Every run is evaluated twice, stochastic and deterministic."""

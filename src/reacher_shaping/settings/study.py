@@ -25,7 +25,7 @@ from reacher_shaping.settings.base import (
     first_problem,
     flat,
 )
-from reacher_shaping.settings.cell import Cell, Protocol, Variant
+from reacher_shaping.settings.cell import LEARNED, Cell, Protocol, Variant
 from reacher_shaping.settings.grid import Known, Placed, placed
 from reacher_shaping.settings.inheritance import resolved, sourced
 from reacher_shaping.settings.parts import Evaluation, Experiment, Peers, Rows
@@ -114,6 +114,11 @@ class Study(Settings):
                 if names.count(cell.name) > 1:
                     raise ValueError(
                         f"{where}: cell {cell.name} is there {names.count(cell.name)} times; allowed: once"
+                    )
+                if cell.potential in LEARNED and cell.protocol.shaping.episode_end == "terminal":
+                    raise ValueError(
+                        f"{where}: cell {cell.name} learns a potential beyond an episode's end, where nothing counts; "
+                        f"allowed: a protocol with shaping.episode_end = 'bootstrap', unlike {cell.protocol.name}"
                     )
                 if known.setdefault(cell.folder, cell) != cell:
                     raise ValueError(
