@@ -82,6 +82,7 @@ def evaluation_episode(
         environment=environment,
         root_seed=root_seed,
     ).iloc[0]
+    # An actor sees observations alone, so the whole state takes stepping the episode again.
     draw = task.draw_reset(stream(root_seed, Purpose.EVALUATION_RESETS))
     lanes = Lanes(task, 1)
     lanes.reset([draw])

@@ -72,7 +72,7 @@ def view_of(task: str) -> View:
 
 @contextmanager
 def rendered(opengl: str, size: int, task: str, goal: NDArray[np.float64], radius: float) -> Iterator[Picture]:
-    """Give pictures rendered by MuJoCo, of `size` pixels a side, with a disc of `radius` m around the `goal` [3] m.
+    """Give pictures rendered by MuJoCo, of `size` pixels a side, a disc or ball of `radius` m around the `goal` [3] m.
 
     `opengl` is what `find_opengl` found. It is chosen here and not by MuJoCo, which decides at its import.
     """
@@ -95,7 +95,7 @@ def rendered(opengl: str, size: int, task: str, goal: NDArray[np.float64], radiu
                 data.qpos[:] = position
                 mujoco.mj_forward(model, data)
                 mujoco.mjv_updateScene(model, data, options, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
-                _add_disc(scene, goal, radius, flat=view.elevation == -90)
+                _mark_goal(scene, goal, radius, flat=view.elevation == -90)
                 mujoco.mjr_render(square, scene, context)
                 pixels = np.empty((size, size, 3), dtype=np.uint8)
                 mujoco.mjr_readPixels(pixels, None, square, context)
@@ -140,7 +140,7 @@ def _camera(view: View) -> mujoco.MjvCamera:
     return camera
 
 
-def _add_disc(scene: mujoco.MjvScene, goal: NDArray[np.float64], radius: float, *, flat: bool) -> None:
+def _mark_goal(scene: mujoco.MjvScene, goal: NDArray[np.float64], radius: float, *, flat: bool) -> None:
     """Add what is translucent around the goal: a disc in the plane, or a ball in space."""
     kind = mujoco.mjtGeom.mjGEOM_CYLINDER if flat else mujoco.mjtGeom.mjGEOM_SPHERE
     size = np.array([radius, 0.0005, 0.0]) if flat else np.full(3, radius)
