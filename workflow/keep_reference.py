@@ -11,8 +11,9 @@ keeps the policies of `results/policies` alone, and leaves all else of the refer
 keeps the report of the reference run, as `make report` builds it where there are no results, in `report/site`: one page
 and one PDF to read without building anything, and for a static host to serve as they are.
 
-The folder is made anew beside the old one and takes its place whole. Ends with 1, and changes nothing, where something
-would be lost or a block cannot be traced to a commit; --force keeps the run all the same.
+The folder is made anew beside the old one and takes its place whole; a further study that `results/` does not have
+stays as it was kept, with the records of its own blocks. Ends with 1, and changes nothing, where something would be
+lost or a block cannot be traced to a commit; --force keeps the run all the same, and says what spoke against it.
 """
 
 import argparse
@@ -63,10 +64,14 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     write_json(folder / "bits.json", published_bits(blocks))
     ledger = yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8"))
     hypotheses = {entry["study"] for entry in ledger}
-    further = {}
+    before = read_json(KEPT / "manifest.json")["experiments"] if (KEPT / "manifest.json").exists() else {}
+    further, earlier = {}, {}
     for name, own in study.studies.items():
         tables, place = outputs.tables_of(study, name, hypotheses), outputs.folder(name)
         if name != MAIN and not all((RESULTS / place / file).exists() for file in tables.values()):
+            if name in before:
+                shutil.copytree(KEPT / place, folder / place)
+                earlier[name] = before[name]
             continue
         keep_tables(RESULTS / place, folder / place, tables)
         if name != MAIN:
@@ -77,6 +82,7 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     shutil.copyfile(figure, folder / FIGURE)
     peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
     record = manifest(study.model_dump(mode="json"), settings_hash(study), blocks, further, peers)
+    record["experiments"] |= earlier
     record["tables"] = checksums(folder)
     write_json(folder / "manifest.json", record)
     return record
@@ -106,6 +112,8 @@ def main() -> None:
         against = objections(KEPT, folder)
         if against and not options.force:
             raise ValueError(f"results/ does not become the reference run: {'; '.join(against)}. --force keeps it")
+        if against:
+            print(f"Kept all the same: {'; '.join(against)}", file=sys.stderr)
         text = headline(load(folder, "report/published"), record, f"{KEPT}/{FIGURE}")
         readme = put_headline(README.read_text(encoding="utf-8"), text)
     write_text(README, readme)

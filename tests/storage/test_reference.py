@@ -254,6 +254,14 @@ def test_what_a_new_reference_would_lose_or_cannot_tell_is_said(tmp_path, change
     assert objections(kept_folder(tmp_path / "kept"), kept_folder(tmp_path / "new", **changes)) == [said]
 
 
+def test_a_block_that_does_not_tell_its_cell_is_said(tmp_path):
+    new = kept_folder(tmp_path / "new")
+    record = json.loads((new / "manifest.json").read_text())
+    del record["blocks"][0]["cell"]
+    write_json(new / "manifest.json", record)
+    assert objections(tmp_path / "none", new) == ["1 of its 2 blocks do not tell their cell"]
+
+
 def test_folder_is_replaced_whole_or_not_at_all(tmp_path):
     kept = kept_folder(tmp_path / "kept", files=("a", "b"))
     before = checksums(kept)

@@ -221,6 +221,7 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     kept, readme = copy.folder / "report/reference", copy.folder / "README.md"
     shutil.copy(ROOT / "README.md", readme)
     before, text = checksums(kept), readme.read_text()
+    earlier = read_json(kept / "manifest.json")["experiments"]
     done = keep(copy)
     assert done.returncode == 1
     assert "it has 4 runs of the main study" in done.stderr
@@ -233,6 +234,11 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     assert done.returncode == 0, done.stderr
     record = read_json(kept / "manifest.json")
     assert record["tables"] == checksums(kept)
+    assert "Kept all the same: it has 4 runs of the main study" in done.stderr
+    further = {name: total for name, total in before.items() if name.startswith("experiments/released/")}
+    assert further
+    assert further.items() <= checksums(kept).items(), "a study that was not made here stays"
+    assert record["experiments"]["released"] == earlier["released"]
     assert record["blocks"][2]["cell"] == {
         "protocol": "paper",
         "variant": "decay200k_l2sq",

@@ -71,11 +71,14 @@ def objections(kept: Path, new: Path) -> list[str]:
         if lost:
             found.append(f"it lacks {len(lost)} files of the one that is kept, such as {lost[0]}")
     blocks = [*record["blocks"], *(block for own in record["experiments"].values() for block in own)]
+    told = [block for block in blocks if "cell" in block]
+    if len(told) < len(blocks):
+        found.append(f"{len(blocks) - len(told)} of its {len(blocks)} blocks do not tell their cell")
     unknown = sum(block["git"]["dirty"] is not False for block in blocks)
     if unknown:
         found.append(f"{unknown} of its {len(blocks)} blocks were not trained from a clean commit")
     codes: dict[str, set[str]] = {}  # another task or schedule is other code
-    for block in blocks:
+    for block in told:
         codes.setdefault(f"{block['cell']['variant']} on {block['task']}", set()).add(block["code"])
     several = sorted(name for name, hashes in codes.items() if len(hashes) > 1)
     if several:
