@@ -13,7 +13,7 @@ from side_by_side import Workload
 from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training.network import Array
-from reacher_shaping.training.rollout import Collector, Plan
+from reacher_shaping.training.rollout import Collector, RolloutLayout
 from reacher_shaping.training.train import TrainState
 
 REPEATS = 10
@@ -22,7 +22,7 @@ REPEATS = 10
 
 def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[Array, Array]]]]:
     """Return (times an iteration, operands) of all matrix products of one iteration."""
-    plan = Plan(settings.rollout_steps, TASK.episode_steps)
+    layout = RolloutLayout(settings.rollout_steps, TASK.episode_steps)
     hidden, batch, features, outputs = (
         settings.hidden_units, settings.minibatch_size, TASK.observation_size + 1, TASK.action_size + 1,
     )  # fmt: skip
@@ -53,8 +53,8 @@ def matrix_products(settings: PPO, seeds: int) -> list[tuple[int, list[tuple[Arr
     minibatches = settings.epochs * settings.rollout_steps // batch
     return [
         (minibatches, forward(batch) + backward),
-        (plan.episode_steps, forward(plan.lanes)),  # acting
-        (1, forward(plan.lanes * (plan.episode_steps + 1))),  # values and log-probabilities of the rollout
+        (layout.episode_steps, forward(layout.lanes)),  # acting
+        (1, forward(layout.lanes * (layout.episode_steps + 1))),  # values and log-probabilities of the rollout
         (1, forward(settings.rollout_steps)),  # the losses logged
     ]
 
@@ -65,10 +65,10 @@ class Floor:
     def __init__(self, cell: Cell, seeds: int) -> None:
         self.cell = cell
         self.seeds = range(seeds)
-        self.plan = Plan(cell.protocol.ppo.rollout_steps, TASK.episode_steps)
+        self.layout = RolloutLayout(cell.protocol.ppo.rollout_steps, TASK.episode_steps)
         model = TASK.simulated_model()
         self.simulation = model, mujoco.MjData(model)
-        self.collector = Collector(TASK, self.seeds, cell.root_seed, self.plan)
+        self.collector = Collector(TASK, self.seeds, cell.root_seed, self.layout)
         self.products = [
             (times, [(a, b, np.empty((seeds, a.shape[1], b.shape[2]), np.float32)) for a, b in operands])
             for times, operands in matrix_products(cell.protocol.ppo, seeds)
@@ -81,7 +81,7 @@ class Floor:
         """
         lanes, iteration = self.collector.lanes, state.iteration
         action = self.collector.collect(state.policy(), iteration).action
-        action = action.reshape(lanes.count, self.plan.episode_steps, -1).astype(np.float64)
+        action = action.reshape(lanes.count, self.layout.episode_steps, -1).astype(np.float64)
         lanes.reset(self.collector.resets(iteration))
         model, data = self.simulation
         start = lanes.batch.state[:, : mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)]
@@ -89,7 +89,7 @@ class Floor:
         mujoco.rollout.rollout(model, data, start, action.repeat(TASK.frame_skip, axis=1))
         seconds = time.process_time() - begun
         # The last lane of every seed is shorter than the time measured.
-        return seconds * self.plan.steps / (self.plan.lanes * self.plan.episode_steps)
+        return seconds * self.layout.steps / (self.layout.lanes * self.layout.episode_steps)
 
     def products_seconds(self) -> float:
         """CPU seconds of an iteration's matrix products, each shape by the faster of NumPy and PyTorch."""
@@ -110,7 +110,7 @@ class Floor:
             begun = time.process_time()
             seconds = share()
             whole = time.process_time() - begun
-            return len(self.seeds) * self.plan.steps * whole / seconds
+            return len(self.seeds) * self.layout.steps * whole / seconds
 
         return one
 

@@ -35,7 +35,8 @@ Collector.collect = noting_the_time  # type: ignore[method-assign]
 
 with tempfile.TemporaryDirectory() as folder:
     block = Path(folder)
-    with training_job.trained_block(cell, seeds, radius=0.02, folder=block / "checkpoint", report=print) as (state, _):
+    training = training_job.trained_block(cell, seeds, success_radius=0.02, folder=block / "checkpoint", report=print)
+    with training as (state, _):
         write_policy(block / "policy.pt", list(seeds), state.policy().weights(), {})
         write_table(block / "progress.parquet", state.progress_frame(), block_schemas.PROGRESS)
 # Not getrusage: its peak starts from that of the process that started this one.

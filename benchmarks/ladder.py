@@ -74,7 +74,7 @@ def engine(
             parts.enter_context(patch.object(ppo, "Learner", AutogradLearner))
         if whole:
             parts.enter_context(patch.object(training, "load_task", lambda name: WHOLE))
-        iterator = training.train(cell, seeds, radius=RADIUS)
+        iterator = training.train(cell, seeds, success_radius=RADIUS)
         first = next(iterator)
     yield first
     yield from iterator

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.settings.study import load_study
 from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training.policy import Policy
@@ -40,11 +40,7 @@ def measures(policy, seeds, cell, study):
     episodes = evaluate(
         policy.act,
         seeds,
-        mode="stochastic",
-        episodes=study.evaluation.episodes,
-        radius=study.evaluation.radius,
-        environment=cell.protocol.environment,
-        root_seed=cell.root_seed,
+        Conditions(cell.protocol.environment, cell.root_seed, study.evaluation.radius, study.evaluation.episodes),
     ).groupby("seed")
     return {
         "success_rate": episodes["success"].mean().to_list(),
@@ -78,7 +74,7 @@ def main():
         for name, values in measures(plain_policy(cell, seed), [seed], cell, study).items():
             plain[name] += values
             print(f"plain loop, seed {seed}: {name} {values[0]:.3f}", flush=True)
-    *_, state = train(cell, range(ENGINE_SEEDS), radius=study.evaluation.radius)
+    *_, state = train(cell, range(ENGINE_SEEDS), success_radius=study.evaluation.radius)
     engine = measures(state.policy(), list(range(ENGINE_SEEDS)), cell, study)
 
     found = {"cell": cell.name, "plain": plain, "engine": engine, "welch_p": {}}

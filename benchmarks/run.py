@@ -36,7 +36,7 @@ from present import write
 from side_by_side import Measure, Worker, Workload, measure, pin, ratios, take_turns
 from sizes import BLOCK, QUICK_SIZE, Size
 
-from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, evaluate
+from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, Conditions, evaluate
 from reacher_shaping.jobs import training_job
 from reacher_shaping.jobs.checkpoint import save_checkpoint
 from reacher_shaping.settings.cell import Cell
@@ -160,7 +160,7 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
     """Evaluation against a loop over gymnasium.make_vec with the same policy."""
     cell, block = size.cell(), size.block
     weight, network = cell.protocol.environment.control_weight, cell.protocol.ppo
-    settings = {"radius": RADIUS, "environment": cell.protocol.environment, "root_seed": 0, "mode": "stochastic"}
+    conditions = Conditions(cell.protocol.environment, 0, RADIUS, size.chunks * LANES_PER_SEED)
     shape = Shape.of(TASK, network)
 
     def policies(seeds: int) -> Policy:
@@ -172,9 +172,7 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
         policy = policies(seeds)
 
         def episodes() -> float:
-            return TASK.episode_steps * len(
-                evaluate(policy.act, range(seeds), episodes=size.chunks * LANES_PER_SEED, **settings)
-            )
+            return TASK.episode_steps * len(evaluate(policy.act, range(seeds), conditions))
 
         return episodes
 

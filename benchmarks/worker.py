@@ -36,7 +36,8 @@ def engine(cell: Cell) -> Work:
 
     def work() -> tuple[float, float]:
         state = next(iterations)
-        return SEEDS * state.plan.steps, float(state.progress["episode_return"][:, state.iteration - 1].mean())
+        last = state.progress["episode_return"][:, state.iteration - 1]
+        return SEEDS * cell.protocol.ppo.rollout_steps, float(last.mean())
 
     return work
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from reacher_shaping.analysis import comparisons, single_seed_studies
 from reacher_shaping.analysis.scores import scores_frame
 from reacher_shaping.evaluation import shown_policies
+from reacher_shaping.evaluation.evaluate import Conditions
 from reacher_shaping.figures.style import save
 from reacher_shaping.report import html, loader
 from reacher_shaping.settings.study import load_study
@@ -111,10 +112,8 @@ def make(folder, study, grid, seeds, **changes):
     write_policy(folder / "policies" / "untrained.pt", [0], start.weights(), {"cell": cell.settings()})
     acts = {"untrained": start.act, "controller": shown_policies.controller(cell)[0]}
     radius = study["evaluation"]["radius"]
-    shown = {
-        name: shown_policies.measured(act, cell, mode="stochastic", episodes=2, radius=radius)
-        for name, act in acts.items()
-    }
+    conditions = Conditions(cell.protocol.environment, cell.root_seed, radius, episodes=2)
+    shown = {name: shown_policies.measured(act, conditions) for name, act in acts.items()}
     shown["untrained"] |= {"cell": cell.name, "seed": 0, "weights": weights_checksum(start.weights())}
     shown["controller"]["gains"] = shown_policies.controller(cell)[1]
     write_json(folder / "policies" / "policies.json", shown)

@@ -11,7 +11,7 @@ import torch
 from cells import fresh_policy
 
 from reacher_shaping import cli
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Variant
 from reacher_shaping.storage.files import sha256, write_json
 from reacher_shaping.storage.policy_format import write_policy
@@ -52,11 +52,7 @@ def test_evaluate_repeats_the_studys_evaluation_of_every_run(ours, policy, capsy
     expected = evaluate(
         policy.act,
         [5, 6],
-        mode="stochastic",
-        episodes=10,
-        radius=0.02,
-        environment=Environment(control_weight=0.25),
-        root_seed=9,
+        Conditions(Environment(control_weight=0.25), root_seed=9, success_radius=0.02, episodes=10),
     )
     assert list(rows.columns) == COLUMNS
     assert rows["run"].unique().tolist() == [str(ours)]

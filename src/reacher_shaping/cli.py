@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NoReturn
 from reacher_shaping import __version__, processor
 
 if TYPE_CHECKING:
-    from reacher_shaping.settings.cell import Environment
+    from reacher_shaping.evaluation.evaluate import Conditions
+    from reacher_shaping.evaluation.policies import Trained
 
 PROGRAM = "reacher-shaping"
 COLUMNS = ("run", "seed", "mean_return", "success_rate", "final_success_rate", "final_distance")
@@ -122,30 +123,15 @@ def _play(options: argparse.Namespace) -> None:
         raise ValueError(f"{options.policy}: has no run {seed}; allowed: {', '.join(map(str, trained.seeds))}")
     row = trained.seeds.index(seed)
     act = trained.policy.only(row).act
-    environment = _environment(options, trained.environment)
-    root_seed = trained.root_seed if options.seed is None else options.seed
+    conditions = _conditions(options, trained)
+    weight = f"{conditions.environment.control_weight:g}"
     if options.record is None:
-        mean = viewer.play(
-            act,
-            episodes=options.episodes,
-            mode=options.mode,
-            environment=environment,
-            root_seed=root_seed,
-        )
-        _say(f"run {seed}: mean return {mean:.2f} at control weight {environment.control_weight:g}")
+        _say(f"run {seed}: mean return {viewer.play(act, conditions):.2f} at control weight {weight}")
         return
-    episode = video.evaluation_episode(
-        act,
-        seed,
-        mode=options.mode,
-        radius=options.radius,
-        environment=environment,
-        root_seed=root_seed,
-    )
+    episode = video.evaluation_episode(act, seed, conditions)
     name = trained.name or options.policy.parent.name or options.policy.stem
-    video.write_video(options.record, video.frames(episode, f"{name}, run {seed}, episode seed {root_seed}"))
-    weight = environment.control_weight
-    _say(f"{options.record}: run {seed}, return {episode.episode_return:.2f} at control weight {weight:g}")
+    video.write_video(options.record, video.frames(episode, f"{name}, run {seed}, episode seed {conditions.root_seed}"))
+    _say(f"{options.record}: run {seed}, return {episode.episode_return:.2f} at control weight {weight}")
 
 
 def _evaluate(options: argparse.Namespace) -> None:
@@ -161,23 +147,14 @@ def _evaluate(options: argparse.Namespace) -> None:
     files = [(path, load_policies(path)) for path in options.paths]  # all of them first: a wrong one costs no wait
     tables = []
     for path, trained in files:
-        environment = _environment(options, trained.environment)
-        root_seed = trained.root_seed if options.seed is None else options.seed
+        conditions = _conditions(options, trained)
         source = trained.source if options.control_weight is None else "as asked for"
         _say(
             f"{path}: {len(trained.seeds)} run(s), {options.episodes} {options.mode} episodes each, "
-            f"control weight {environment.control_weight:g} ({source}), seed {root_seed}"
+            f"control weight {conditions.environment.control_weight:g} ({source}), seed {conditions.root_seed}"
         )
         with np.errstate(over="ignore", invalid="ignore"):  # absurd weights give an infinite return, which says it
-            episodes = evaluate(
-                trained.policy.act,
-                trained.seeds,
-                mode=options.mode,
-                episodes=options.episodes,
-                radius=options.radius,
-                environment=environment,
-                root_seed=root_seed,
-            )
+            episodes = evaluate(trained.policy.act, trained.seeds, conditions)
         columns = {"episode_return": "mean_return", "success": "success_rate", "final_success": "final_success_rate"}
         means = (
             episodes.rename(columns=columns)
@@ -203,10 +180,18 @@ def _no_formula(path: Path) -> str:
     return f"./{path}" if str(path).startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else str(path)
 
 
-def _environment(options: argparse.Namespace, trained: "Environment") -> "Environment":
-    """The environment of the training, with the weight that was asked for."""
-    weight = options.control_weight
-    return trained if weight is None else trained.model_copy(update={"control_weight": float(weight)})
+def _conditions(options: argparse.Namespace, trained: "Trained") -> "Conditions":
+    """The environment and root seed of the training, where no others were asked for."""
+    from reacher_shaping.evaluation.evaluate import Conditions
+
+    weight, environment = options.control_weight, trained.environment
+    return Conditions(
+        environment=environment if weight is None else environment.model_copy(update={"control_weight": float(weight)}),
+        root_seed=trained.root_seed if options.seed is None else options.seed,
+        success_radius=options.radius,
+        episodes=options.episodes,
+        mode=options.mode,
+    )
 
 
 def _say(line: str) -> None:

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from reacher_shaping.analysis.target_maps import SQUARE, reacher_targets, target_map
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks import reacher
@@ -21,7 +21,7 @@ def test_targets_are_those_that_evaluation_episodes_start_with():
         seen.append(observation[0, :, 4:6].copy())
         return np.zeros((1, observation.shape[1], 2))
 
-    evaluate(still, [0], mode="deterministic", episodes=60, radius=0.02, environment=Environment(), root_seed=11)
+    evaluate(still, [0], Conditions(Environment(), 11, 0.02, 60, "deterministic"))
     met = np.concatenate([seen[0], seen[50]])  # two chunks of lanes, at their first steps
     np.testing.assert_allclose(reacher_targets(11, 60), met[:60], atol=1e-12)
 

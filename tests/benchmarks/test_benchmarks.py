@@ -42,7 +42,7 @@ def test_every_rung_of_the_ladder_trains_the_same_weights():
             torch.testing.assert_close(weights[key][0], tensor, rtol=0, atol=2e-5, msg=f"{name}: {key}")
     before = trained["+ written-out gradient"]
     for name, idea in (("+ lean model", "what moves nothing"), (CLOCK_OFF, "the profiling clock")):
-        assert torch.equal(trained[name].rows, before.rows), f"{idea} changes no bit"
+        assert torch.equal(trained[name].parameters, before.parameters), f"{idea} changes no bit"
 
 
 def test_the_floor_holds_every_matrix_product_of_an_iteration(monkeypatch):
@@ -117,7 +117,7 @@ def test_what_prepares_a_share_of_the_floor_does_not_count(monkeypatch):
     ticks = iter([2.0, 6.0])
     monkeypatch.setattr(floor.time, "process_time", lambda: next(ticks))
     steps = of.alone(lambda: 1.0)()  # a second of the four is the share
-    assert steps / 4.0 == 3 * of.plan.steps / 1.0
+    assert steps / 4.0 == 3 * of.layout.steps / 1.0
 
 
 def test_readme_says_what_was_measured():

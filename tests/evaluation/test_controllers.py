@@ -4,12 +4,12 @@ import pytest
 from stable_baselines3.common.monitor import Monitor
 
 from reacher_shaping.evaluation import controllers, episode_lengths
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks.reacher import draw_reset
 
-SETTINGS = {"radius": 0.02, "environment": Environment(control_weight=1.0), "root_seed": 3}
+SETTINGS = {"success_radius": 0.02, "environment": Environment(control_weight=1.0), "root_seed": 3}
 
 
 def targets(count):
@@ -49,8 +49,8 @@ def test_unreachable_target_is_approached_as_far_as_the_arm_allows(distance):
 @pytest.mark.parametrize("weight", [0.1, 1.0])
 def test_reach_succeeds_always_and_beats_doing_nothing(weight):
     settings = SETTINGS | {"environment": Environment(control_weight=weight), "mode": "deterministic", "episodes": 40}
-    frame = evaluate(controllers.reach(controllers.TUNED_GAINS[weight]), [0], **settings)
-    idle = evaluate(controllers.still(2), [0], **settings)
+    frame = evaluate(controllers.reach(controllers.TUNED_GAINS[weight]), [0], Conditions(**settings))
+    idle = evaluate(controllers.still(2), [0], Conditions(**settings))
     assert frame["final_success"].all()
     assert frame["episode_return"].mean() > idle["episode_return"].mean() + 5
 
@@ -62,7 +62,7 @@ def test_gains_are_at_a_local_optimum_for_their_control_weight():
             "mode": "deterministic",
             "episodes": 40,
         }
-        return evaluate(controllers.reach(gains), [0], **settings)["episode_return"].mean()
+        return evaluate(controllers.reach(gains), [0], Conditions(**settings))["episode_return"].mean()
 
     heavy, light = controllers.TUNED_GAINS[1.0], controllers.TUNED_GAINS[0.1]
     assert mean_return(1.0, heavy) > mean_return(1.0, light)
@@ -71,7 +71,7 @@ def test_gains_are_at_a_local_optimum_for_their_control_weight():
 
 def test_evaluation_of_a_controller_equals_stepping_gymnasium_under_monitor():
     episodes = 3
-    frame = evaluate(controllers.gaussian, [0], mode="stochastic", episodes=episodes, **SETTINGS)
+    frame = evaluate(controllers.gaussian, [0], Conditions(episodes=episodes, **SETTINGS))
     environment = Monitor(gymnasium.make("Reacher-v5", reward_control_weight=1.0))
     resets, noise = stream(3, Purpose.EVALUATION_RESETS), stream(3, Purpose.EVALUATION_ACTIONS)
     for row in frame.itertuples():
@@ -102,7 +102,7 @@ def test_random_policy_without_noise_is_refused():
 
 
 def test_controllers_table_has_a_row_each_with_intervals_around_the_means():
-    frame = controllers.evaluate_controllers(episodes=20, **SETTINGS).set_index("controller")
+    frame = controllers.evaluate_controllers(Conditions(episodes=20, **SETTINGS)).set_index("controller")
     assert len(frame) == 6
     assert (frame["mean_return_low"] <= frame["mean_return"]).all()
     assert (frame["mean_return"] <= frame["mean_return_high"]).all()
@@ -119,8 +119,8 @@ def test_controllers_table_has_a_row_each_with_intervals_around_the_means():
 def test_long_episodes_start_with_the_studys_own_and_hold_their_measures():
     reach = controllers.reach(controllers.TUNED_GAINS[1.0])
     settings = SETTINGS | {"mode": "deterministic", "episodes": 5}
-    frame = episode_lengths.evaluate_lengths(lambda o, n: reach(o, n), [4, 7], lengths=(50, 100), **settings)
-    own = evaluate(reach, [4], **settings)
+    frame = episode_lengths.evaluate_lengths(lambda o, n: reach(o, n), [4, 7], Conditions(**settings), (50, 100))
+    own = evaluate(reach, [4], Conditions(**settings))
     assert frame[["seed", "steps"]].to_numpy().tolist() == [[4, 50], [4, 100], [7, 50], [7, 100]]
     first = frame.iloc[0]
     assert first["return_per_step"] * 50 == pytest.approx(own["episode_return"].mean())
@@ -139,12 +139,15 @@ def share_by_gymnasium(act, episodes):
         state, truncated = env.reset()[0], False
         while not truncated:
             state, _, _, truncated, info = env.step(act(state[None, None], None)[0, 0])
-            within.append(-info["reward_dist"] <= SETTINGS["radius"])
+            within.append(-info["reward_dist"] <= SETTINGS["success_radius"])
     return np.mean(within)
 
 
 def test_share_within_radius_counts_every_step_and_no_reset():
     frame = episode_lengths.evaluate_lengths(
-        controllers.still(2), [0], mode="deterministic", episodes=7, lengths=(10,), **SETTINGS | {"radius": 10.0}
+        controllers.still(2),
+        [0],
+        Conditions(mode="deterministic", episodes=7, **SETTINGS | {"success_radius": 10.0}),
+        (10,),
     )
     assert frame["share_within_radius"].item() == 1

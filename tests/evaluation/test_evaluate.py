@@ -7,7 +7,7 @@ import pytest
 from cells import fresh_policy
 from stable_baselines3.common.monitor import Monitor
 
-from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, evaluate
+from reacher_shaping.evaluation.evaluate import LANES_PER_SEED, Conditions, evaluate
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.training.policy import Policy
@@ -15,7 +15,7 @@ from reacher_shaping.training.policy import Policy
 pytestmark = pytest.mark.slow
 
 ROOT, WEIGHT, RADIUS = 5, 0.1, 0.05
-SETTINGS = {"radius": RADIUS, "environment": Environment(control_weight=WEIGHT), "root_seed": ROOT}
+SETTINGS = {"success_radius": RADIUS, "environment": Environment(control_weight=WEIGHT), "root_seed": ROOT}
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def monitored(policy, row, mode, episodes, *, clip=False):
     env = Monitor(gymnasium.make("Reacher-v5", reward_control_weight=WEIGHT))
     resets, draws = stream(ROOT, Purpose.EVALUATION_RESETS), stream(ROOT, Purpose.EVALUATION_ACTIONS)
     env.unwrapped.np_random = resets
-    alone = Policy(policy.rows[row : row + 1].clone(), policy.shape)
+    alone = Policy(policy.parameters[row : row + 1].clone(), policy.shape)
     rows = []
     for _ in range(episodes):
         noise = draws.standard_normal((50, 2), dtype=np.float32)
@@ -68,7 +68,7 @@ def test_episodes_are_those_of_gymnasium_under_monitor(policy, mode, clip):
     """Monitor rounds returns to six digits; actions of one lane and of fifty differ in the last digit of float32."""
     environment = Environment(control_weight=WEIGHT, clip_actions=clip)
     settings = SETTINGS | {"environment": environment}
-    ours = evaluate(policy.act, [10, 11], mode=mode, episodes=25, **settings)
+    ours = evaluate(policy.act, [10, 11], Conditions(mode=mode, episodes=25, **settings))
     assert ours["seed"].tolist() == [10] * 25 + [11] * 25
     assert ours["episode"].tolist() == [*range(25)] * 2
     assert set(ours["mode"]) == {mode}
@@ -87,18 +87,18 @@ def test_episodes_are_those_of_gymnasium_under_monitor(policy, mode, clip):
 
 def test_fewer_episodes_are_the_first_of_more(policy):
     """Whole and broken chunks of lanes alike."""
-    long = evaluate(policy.act, [0, 1], mode="stochastic", episodes=110, **SETTINGS)
+    long = evaluate(policy.act, [0, 1], Conditions(episodes=110, **SETTINGS))
     for episodes in (1, 50, 73):
-        short = evaluate(policy.act, [0, 1], mode="stochastic", episodes=episodes, **SETTINGS)
+        short = evaluate(policy.act, [0, 1], Conditions(episodes=episodes, **SETTINGS))
         expected = long[long["episode"] < episodes].reset_index(drop=True)
         pd.testing.assert_frame_equal(short, expected, check_exact=True)
 
 
 def test_a_policys_episodes_do_not_depend_on_the_block(policy):
-    both = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
+    both = evaluate(policy.act, [0, 1], Conditions(episodes=20, **SETTINGS))
     for row in (0, 1):
-        single = Policy(policy.rows[row : row + 1].clone(), policy.shape)
-        alone = evaluate(single.act, [row], mode="stochastic", episodes=20, **SETTINGS)
+        single = Policy(policy.parameters[row : row + 1].clone(), policy.shape)
+        alone = evaluate(single.act, [row], Conditions(episodes=20, **SETTINGS))
         pd.testing.assert_frame_equal(alone, both[both["seed"] == row].reset_index(drop=True), check_exact=True)
 
 
@@ -110,7 +110,7 @@ def test_all_policies_and_modes_meet_the_same_resets_and_the_same_noise():
         return np.zeros((*observation.shape[:2], 2))
 
     for mode in ("stochastic", "deterministic"):
-        evaluate(spy, [4, 9], mode=mode, episodes=2 * LANES_PER_SEED, **SETTINGS)
+        evaluate(spy, [4, 9], Conditions(mode=mode, episodes=2 * LANES_PER_SEED, **SETTINGS))
     stochastic, deterministic = seen[:100], seen[100:]
     assert all(noise is None for _, noise in deterministic)
     for t in (0, 50):
@@ -124,12 +124,12 @@ def test_all_policies_and_modes_meet_the_same_resets_and_the_same_noise():
 
 
 def test_radius_and_weight_change_only_what_they_should(policy):
-    base = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
-    wide = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS | {"radius": 10.0})
+    base = evaluate(policy.act, [0, 1], Conditions(episodes=20, **SETTINGS))
+    wide = evaluate(policy.act, [0, 1], Conditions(episodes=20, **SETTINGS | {"success_radius": 10.0}))
     assert wide["success"].all()
     assert (wide["first_hit_step"] == 1).all()
     settings = SETTINGS | {"environment": Environment(control_weight=1.0)}
-    dear = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **settings)
+    dear = evaluate(policy.act, [0, 1], Conditions(episodes=20, **settings))
     np.testing.assert_allclose(dear["reward_control"], 10 * base["reward_control"], rtol=1e-6)
     for name in ("reward_distance", "min_distance", "final_distance"):
         assert base[name].equals(wide[name])
@@ -141,7 +141,8 @@ def test_longer_episodes_start_with_the_short_ones():
         return np.zeros((*observation.shape[:2], 2))
 
     short, long = (
-        evaluate(zero, [0], mode="deterministic", episodes=3, steps=steps, **SETTINGS) for steps in (50, 200)
+        evaluate(zero, [0], Conditions(mode="deterministic", episodes=3, steps=steps, **SETTINGS))
+        for steps in (50, 200)
     )
     assert (long["reward_distance"] < short["reward_distance"]).all()
     assert (long["min_distance"] <= short["min_distance"]).all()
@@ -150,10 +151,10 @@ def test_longer_episodes_start_with_the_short_ones():
 
 
 def test_a_policy_of_nans_gives_rows_and_leaves_the_others_alone(policy):
-    clean = evaluate(policy.act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
-    rows = policy.rows.clone()
+    clean = evaluate(policy.act, [0, 1], Conditions(episodes=20, **SETTINGS))
+    rows = policy.parameters.clone()
     rows[0] = np.nan
-    found = evaluate(Policy(rows, policy.shape).act, [0, 1], mode="stochastic", episodes=20, **SETTINGS)
+    found = evaluate(Policy(rows, policy.shape).act, [0, 1], Conditions(episodes=20, **SETTINGS))
     second = [frame[frame["seed"] == 1] for frame in (found, clean)]
     pd.testing.assert_frame_equal(*second, check_exact=True)
     assert found[found["seed"] == 0]["episode_return"].isna().all()

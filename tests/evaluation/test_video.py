@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 
 import imageio_ffmpeg
 import mujoco
@@ -9,17 +10,17 @@ from toys import point_mass
 
 from reacher_shaping.evaluation import video
 from reacher_shaping.evaluation.controllers import TUNED_GAINS, reach
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks import rendering
 from reacher_shaping.tasks.base import load_task
 
-SETTINGS = {"mode": "deterministic", "radius": 0.02, "environment": Environment(control_weight=1.0), "root_seed": 0}
+CONDITIONS = Conditions(Environment(control_weight=1.0), 0, 0.02, episodes=20, mode="deterministic")
 
 
 @pytest.fixture(scope="module")
 def episode():
-    return video.evaluation_episode(reach(TUNED_GAINS[1.0]), 0, **SETTINGS)
+    return video.evaluation_episode(reach(TUNED_GAINS[1.0]), 0, CONDITIONS)
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def no_opengl(monkeypatch):
 
 
 def test_filmed_episode_is_the_first_of_the_evaluation(episode):
-    row = evaluate(reach(TUNED_GAINS[1.0]), [0], episodes=20, **SETTINGS).iloc[0]
+    row = evaluate(reach(TUNED_GAINS[1.0]), [0], CONDITIONS).iloc[0]
     assert episode.episode_return == row["episode_return"]
     assert episode.positions.shape == (51, 4)
     assert episode.distances[-1] == pytest.approx(row["final_distance"], abs=1e-12)
@@ -122,9 +123,9 @@ def still(task):
 @pytest.mark.parametrize(("task", "positions"), [("reacher", 4), ("pusher", 11), ("fetch_reach", 15)])
 def test_every_tasks_filmed_episode_is_the_first_of_its_evaluation(task, positions, monkeypatch):
     record = load_task(task)
-    settings = SETTINGS | {"environment": Environment(task=task, clip_actions=True)}
-    filmed = video.evaluation_episode(still(task), 0, **settings)
-    row = evaluate(still(task), [0], episodes=20, **settings).iloc[0]
+    conditions = replace(CONDITIONS, environment=Environment(task=task, clip_actions=True))
+    filmed = video.evaluation_episode(still(task), 0, conditions)
+    row = evaluate(still(task), [0], conditions).iloc[0]
     assert filmed.positions.shape == (record.episode_steps + 1, positions)
     assert filmed.distances[-1] == row["final_distance"]
     assert filmed.distances[1:].min() == row["min_distance"]
@@ -137,7 +138,7 @@ def test_every_tasks_filmed_episode_is_the_first_of_its_evaluation(task, positio
 @pytest.mark.parametrize("task", ["pusher", "fetch_reach"])
 def test_goal_is_drawn_where_the_environment_measures_it(task):
     """With Gymnasium's own bodies: what the distance is measured to lies in the middle of the ball."""
-    filmed = video.evaluation_episode(still(task), 0, **SETTINGS | {"environment": Environment(task=task)})
+    filmed = video.evaluation_episode(still(task), 0, replace(CONDITIONS, environment=Environment(task=task)))
     model = load_task(task).model()
     data = mujoco.MjData(model)
     data.qpos[:] = filmed.positions[0]
@@ -151,7 +152,7 @@ def test_rendering_of_a_task_shows_the_ball_around_its_goal(task):
     opengl = rendering.find_opengl()
     if opengl is None:
         pytest.skip("no OpenGL here")
-    position = video.evaluation_episode(still(task), 0, **SETTINGS | {"environment": Environment(task=task)})
+    position = video.evaluation_episode(still(task), 0, replace(CONDITIONS, environment=Environment(task=task)))
     pictures = []
     for away in (0.0, 9.0):
         with rendering.rendered(opengl, 96, task, position.goal + away, 0.05) as picture:

@@ -117,8 +117,8 @@ def test_impossible_trial_is_one_line():
 def test_score_is_the_mean_over_what_the_evaluation_found(monkeypatch):
     asked = {}
 
-    def evaluate(act, seeds, **given):
-        asked.update(given, seeds=seeds)
+    def evaluate(act, seeds, conditions):
+        asked.update(vars(conditions), seeds=seeds)
         columns = search.MEASURES.values()
         return pd.DataFrame({name: [1.0 * place, 3.0 * place] for place, name in enumerate(columns)})
 
@@ -126,17 +126,17 @@ def test_score_is_the_mean_over_what_the_evaluation_found(monkeypatch):
     settings = PPO(rollout_steps=192, epochs=1, minibatch_size=32)
     protocol = Protocol(name="standard", ppo=settings, environment=Environment(control_weight=0.5, clip_actions=True))
     cell = SPEC.cell(protocol, L2, {}).model_copy(update={"budget": 192})
-    found = search.score(cell, 3, episodes=7, radius=0.03)
+    found = search.score(cell, 3, episodes=7, success_radius=0.03)
     assert found == {name: 2.0 * place for place, name in enumerate(search.MEASURES)}
-    expected = {"mode": "stochastic", "environment": protocol.environment, "episodes": 7, "radius": 0.03}
-    assert asked == expected | {"seeds": [0, 1, 2], "root_seed": 5}
+    expected = {"mode": "stochastic", "environment": protocol.environment, "episodes": 7, "steps": None}
+    assert asked == expected | {"success_radius": 0.03, "seeds": [0, 1, 2], "root_seed": 5}
 
 
 def test_score_is_that_of_real_runs():
     settings = PPO(rollout_steps=192, epochs=1, minibatch_size=32)
     cell = SPEC.cell(Protocol(name="standard", ppo=settings), L2, {}).model_copy(update={"budget": 384})
-    found = search.score(cell, 2, episodes=50, radius=0.05)
-    assert found == search.score(cell, 2, episodes=50, radius=0.05)
+    found = search.score(cell, 2, episodes=50, success_radius=0.05)
+    assert found == search.score(cell, 2, episodes=50, success_radius=0.05)
     assert set(found) == set(search.MEASURES)
     assert -200 < found["mean_return"] < -5
     assert 0 <= found["final_success_rate"] <= found["success_rate"] <= 1

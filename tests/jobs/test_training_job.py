@@ -21,7 +21,7 @@ def trained(folder, lines, seconds_per_checkpoint=30.0, record=None):
     with training_job.trained_block(
         CELL,
         SEEDS,
-        radius=0.02,
+        success_radius=0.02,
         folder=folder,
         report=lines.append,
         record=record,
@@ -56,7 +56,7 @@ def test_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch, aft
     assert done == 4 - after
     went_on = f"goes on from iteration {after} of 4"
     assert lines[0] == ("takes over the training that a job before has finished" if after == 4 else went_on)
-    assert torch.equal(whole.rows, resumed.rows)
+    assert torch.equal(whole.parameters, resumed.parameters)
     assert whole.progress_frame().equals(resumed.progress_frame())
     assert whole.episodes_frame().equals(resumed.episodes_frame())
 
@@ -82,7 +82,7 @@ def test_finished_training_is_taken_over_until_its_checkpoint_is_removed(tmp_pat
     lines = []
     again, done = trained(tmp_path / "key", lines)
     assert (done, lines) == (0, ["takes over the training that a job before has finished"])
-    assert torch.equal(first.rows, again.rows)
+    assert torch.equal(first.parameters, again.parameters)
     assert first.progress_frame().equals(again.progress_frame())
     assert [path.name for path in tmp_path.iterdir()] == ["key"], "no lock is left"
 
@@ -91,7 +91,9 @@ def test_checkpoint_stays_until_the_result_is_saved(tmp_path):
     folder = tmp_path / "key"
     with (
         pytest.raises(OSError, match="disk full"),
-        training_job.trained_block(CELL, SEEDS, radius=0.02, folder=folder, report=print, seconds_per_checkpoint=0.0),
+        training_job.trained_block(
+            CELL, SEEDS, success_radius=0.02, folder=folder, report=print, seconds_per_checkpoint=0.0
+        ),
     ):
         raise OSError("disk full")
     assert [path.name for path in folder.iterdir()] == ["checkpoint.pt"], "not marked as finished"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reacher_shaping.evaluation import shown_policies
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.report import arm
 from reacher_shaping.settings.cell import PPO, Cell
 from reacher_shaping.settings.study import load_study
@@ -103,8 +103,7 @@ def test_success_is_that_of_the_evaluation_within_binomial_error(page, cell, nam
     policy = shown_policies.untrained(cell, 0)
     act, gains = (policy.act, None) if name == "untrained" else shown_policies.controller(cell)
     mode = "stochastic" if name == "untrained" else "deterministic"
-    how = {"mode": mode, "episodes": 1000, "radius": radius, "root_seed": 1}
-    ours = evaluate(act, [0], environment=cell.protocol.environment, **how)
+    ours = evaluate(act, [0], Conditions(cell.protocol.environment, 1, radius, 1000, mode))
     one = {"weights": acting(policy.weights())} if gains is None else {"gains": gains}
     found = page.evaluate("([one, radius]) => arm.rates(arm.policyOf(one), 1000, 7, true, radius)", [one, radius])
     for rate, column in ((found["touched"], "success"), (found["ended"], "final_success")):
@@ -116,11 +115,8 @@ def test_success_is_that_of_the_evaluation_within_binomial_error(page, cell, nam
 def test_shown_policy_is_what_the_summary_says(cell):
     assert isinstance(cell, Cell)
     policy = shown_policies.untrained(cell, 0)
-    told = shown_policies.measured(policy.act, cell, mode="stochastic", episodes=200, radius=0.02)
-    rows = evaluate(
-        policy.act, [0], mode="stochastic", episodes=200, radius=0.02,
-        environment=cell.protocol.environment, root_seed=cell.root_seed,
-    )  # fmt: skip
+    conditions = Conditions(cell.protocol.environment, cell.root_seed, 0.02, 200)
+    told, rows = shown_policies.measured(policy.act, conditions), evaluate(policy.act, [0], conditions)
     assert told["touched"] == rows["success"].mean()
     near = np.linalg.norm(
         np.subtract([[float(one) for one in point.split(",")] for point in told["path"].split()], told["target"]),

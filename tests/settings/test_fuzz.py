@@ -144,7 +144,7 @@ def stored(tmp_path_factory) -> Path:
     """One valid file of each kind."""
     folder = tmp_path_factory.mktemp("stored") / "key"
     cell = small("l2", iterations=2)
-    *_, state = train(cell, [0, 1], radius=0.02)
+    *_, state = train(cell, [0, 1], success_radius=0.02)
     save_checkpoint(folder / "checkpoint.pt", state)
     policy = fresh_policy([0, 1])
     write_policy(folder / "policy.pt", [0, 1], policy.weights(), {"cell": cell.settings()})

@@ -56,7 +56,7 @@ def test_actions_of_a_seed_do_not_depend_on_the_others(policy, lanes):
     observation, noise = rng.normal(size=(3, lanes, 10)), rng.standard_normal((3, lanes, 2), dtype=np.float32)
     together = policy.act(observation, noise)
     for seed in range(3):
-        alone = Policy(policy.rows[seed : seed + 1].clone(), policy.shape)
+        alone = Policy(policy.parameters[seed : seed + 1].clone(), policy.shape)
         np.testing.assert_array_equal(alone.act(observation[[seed]], noise[[seed]])[0], together[seed])
 
 
@@ -81,8 +81,8 @@ def test_initial_weights_are_uniform_in_the_range_of_torch_linear_and_log_std_is
 
 def test_initial_weights_depend_on_seed_and_root_alone():
     rows = fresh_policy(SEEDS, 3).rows
-    assert torch.equal(fresh_policy([5, 0], 3).rows, rows[[2, 0]])
-    assert not torch.equal(fresh_policy([5], 4).rows[0], rows[2])
+    assert torch.equal(fresh_policy([5, 0], 3).parameters, rows[[2, 0]])
+    assert not torch.equal(fresh_policy([5], 4).parameters[0], rows[2])
     assert not torch.equal(rows[0], rows[1])
 
 
@@ -93,9 +93,9 @@ def test_weights_round_trip_bit_for_bit(hidden, networks):
     policy = fresh_policy(SEEDS, 3, settings)
     assert torch.equal(policy.layers.log_std, torch.full((len(SEEDS), 2, 1), -0.25))
     copy = Policy.from_weights(policy.weights(), TASK)
-    assert torch.equal(copy.rows, policy.rows)
+    assert torch.equal(copy.parameters, policy.parameters)
     assert copy.shape == policy.shape == (10, 2, hidden, settings.towers)
-    assert policy.rows.shape[1] == parameter_count(policy.shape)
+    assert policy.parameters.shape[1] == parameter_count(policy.shape)
     assert parameter_count(policy.shape) % ALIGNMENT == 0
 
 
@@ -133,10 +133,10 @@ def test_orthogonal_weights_are_orthogonal_with_stable_baselines3s_gains():
 
 def test_weights_are_copies(policy):
     weights = policy.weights()
-    before = policy.rows.clone()
+    before = policy.parameters.clone()
     for tensor in weights.values():
         tensor.fill_(9.0)
-    assert torch.equal(policy.rows, before)
+    assert torch.equal(policy.parameters, before)
 
 
 def test_a_state_dict_in_the_layout_of_the_release_becomes_a_policy_of_one_seed():
@@ -173,6 +173,6 @@ def test_padding_of_the_rows_is_never_read(policy):
     observation = np.random.default_rng(3).normal(size=(3, 4, 10))
     before = policy.act(observation, None)
     used = sum(math.prod(layer.shape[1:]) for layer in policy.layers)
-    assert used < policy.rows.shape[1]
-    policy.rows[:, used:] = math.nan
+    assert used < policy.parameters.shape[1]
+    policy.parameters[:, used:] = math.nan
     np.testing.assert_array_equal(policy.act(observation, None), before)

@@ -22,19 +22,18 @@ from pathlib import Path
 from reacher_shaping import processor
 processor.fix(sys.argv[2])
 from cells import small
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.jobs import training_job
 from reacher_shaping.storage.policy_format import write_policy
 path = Path(sys.argv[1])
 for variant, changes in (("l2", {}), ("decay", {"networks": "separate", "initialisation": "orthogonal"})):
     cell = small(variant, iterations=2, **changes)
     block = path / f"{variant}-block"
-    with training_job.trained_block(cell, [0, 1], radius=0.02, folder=block, report=print) as (state, _):
+    with training_job.trained_block(cell, [0, 1], success_radius=0.02, folder=block, report=print) as (state, _):
         policy = state.policy()
         write_policy(path / f"{variant}.pt", state.seeds, policy.weights(), {})
         state.progress_frame().to_parquet(path / f"{variant}-progress.parquet")
-        options = {"episodes": 10, "radius": 0.02, "environment": cell.protocol.environment, "root_seed": 1}
-        episodes = evaluate(policy.act, state.seeds, mode="stochastic", **options)
+        episodes = evaluate(policy.act, state.seeds, Conditions(cell.protocol.environment, 1, 0.02, episodes=10))
         episodes.to_parquet(path / f"{variant}-episodes.parquet")
 """
 EMULATED = ("Haswell-v4", "Skylake-Client", "EPYC-v3")

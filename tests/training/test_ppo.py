@@ -84,7 +84,7 @@ def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, va
     learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.differentiate(samples)
     ours = Policy(learner.gradient, Shape.of(TASK, options)).weights()
-    owned = Policy.from_weights(ours, TASK).rows  # what the weights do not name is zero in it
+    owned = Policy.from_weights(ours, TASK).parameters  # what the weights do not name is zero in it
     assert torch.equal(learner.gradient.float(), owned)
     for seed in range(len(rows)):
         network = network_of(rows, seed, HIDDEN)
@@ -248,8 +248,8 @@ def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
     (rows if poison == "weights" else records)[1] = math.nan
     learner = ppo.Learner(rows, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
-    assert torch.equal(learner.rows[[0, 2]], clean.rows[[0, 2]])
-    assert not torch.isfinite(learner.rows[1]).any()
+    assert torch.equal(learner.parameters[[0, 2]], clean.parameters[[0, 2]])
+    assert not torch.isfinite(learner.parameters[1]).any()
 
 
 def test_padding_of_the_rows_stays_zero():

@@ -7,10 +7,10 @@ from cells import cell, fresh_policy, small
 
 from reacher_shaping.random_streams import Purpose, stream
 from reacher_shaping.tasks.reacher import TASK, dense
-from reacher_shaping.training.rollout import Collector, Plan
+from reacher_shaping.training.rollout import Collector, RolloutLayout
 
 CELL = cell("l2")
-PLAN = Plan(2048, 50)
+LAYOUT = RolloutLayout(2048, 50)
 
 
 def policy_of(seeds, of=CELL):
@@ -20,7 +20,7 @@ def policy_of(seeds, of=CELL):
 @pytest.fixture(scope="module")
 def rollout():
     """Iteration 5 of seeds 0, 3."""
-    return Collector(TASK, [0, 3], CELL.root_seed, PLAN).collect(policy_of([0, 3]), 5)
+    return Collector(TASK, [0, 3], CELL.root_seed, LAYOUT).collect(policy_of([0, 3]), 5)
 
 
 def test_stepping_gymnasium_with_the_same_actions_gives_the_same_bits(rollout):
@@ -30,10 +30,10 @@ def test_stepping_gymnasium_with_the_same_actions_gives_the_same_bits(rollout):
     for row, seed in enumerate([0, 3]):
         env.unwrapped.np_random = stream(CELL.root_seed, Purpose.RESETS, seed, 5)
         steps = 0
-        for lane in range(PLAN.lanes):
+        for lane in range(LAYOUT.lanes):
             observation, _ = env.reset()
             np.testing.assert_array_equal(rollout.observation[row, lane, 0], observation)
-            for t in range(PLAN.lengths[lane]):
+            for t in range(LAYOUT.lengths[lane]):
                 observation, reward, terminated, truncated, _ = env.step(rollout.action[row, lane, t])
                 steps += 1
                 np.testing.assert_array_equal(rollout.observation[row, lane, t + 1], observation)
@@ -60,10 +60,10 @@ def test_rollout_equals_the_plain_loop(rollout):
         "reward": reward,
         "distance": rollout.distance[..., :-1],
         "next_distance": rollout.distance[..., 1:],
-        "end": np.broadcast_to(PLAN.ends, reward.shape),
+        "end": np.broadcast_to(LAYOUT.episode_ends, reward.shape),
     }
     for name, values in sequence.items():
-        ours, expected = PLAN.sequence(values)[1], getattr(plain, name)
+        ours, expected = LAYOUT.sequence(values)[1], getattr(plain, name)
         assert len(ours) == 2048
         np.testing.assert_allclose(ours, expected, rtol=0, atol=0 if name == "end" else 1e-3, err_msg=name)
         if name in ("action", "distance", "reward"):
@@ -82,14 +82,14 @@ def test_noise_is_indexed_by_episode_and_step(rollout):
 
 @pytest.mark.parametrize("block", [[3], [9, 3, 4], [*range(10)]], ids=len)
 def test_a_seeds_rollout_is_the_same_in_every_block(rollout, block):
-    ours = Collector(TASK, block, CELL.root_seed, PLAN).collect(policy_of(block), 5)
+    ours = Collector(TASK, block, CELL.root_seed, LAYOUT).collect(policy_of(block), 5)
     row = block.index(3)
     for name in ("observation", "distance", "action", "control"):
         np.testing.assert_array_equal(getattr(ours, name)[row], getattr(rollout, name)[1], err_msg=name)
 
 
 def test_a_collector_keeps_nothing_from_one_rollout_to_the_next(rollout):
-    collector = Collector(TASK, [3], CELL.root_seed, PLAN)
+    collector = Collector(TASK, [3], CELL.root_seed, LAYOUT)
     for iteration in (0, 5):
         ours = collector.collect(policy_of([3]), iteration)
     np.testing.assert_array_equal(ours.observation, rollout.observation[1:])
@@ -98,17 +98,17 @@ def test_a_collector_keeps_nothing_from_one_rollout_to_the_next(rollout):
 
 
 def test_a_shorter_rollout_is_the_start_of_a_longer_one(rollout):
-    plan = Plan(192, 50)
-    ours = Collector(TASK, [3], CELL.root_seed, plan).collect(policy_of([3]), 5)
+    layout = RolloutLayout(192, 50)
+    ours = Collector(TASK, [3], CELL.root_seed, layout).collect(policy_of([3]), 5)
     for name in ("observation", "action"):
-        expected = PLAN.sequence(getattr(rollout, name)[:, :, :50])[1, :192]
-        np.testing.assert_allclose(plan.sequence(getattr(ours, name)[:, :, :50])[0], expected, atol=1e-3)
+        expected = LAYOUT.sequence(getattr(rollout, name)[:, :, :50])[1, :192]
+        np.testing.assert_allclose(layout.sequence(getattr(ours, name)[:, :, :50])[0], expected, atol=1e-3)
 
 
 def test_clipped_actions_are_stepped_and_charged_and_the_loss_sees_the_sample():
     of = small()
     raw, clipped = (
-        Collector(TASK, [1], of.root_seed, Plan(192, 50), clip_actions=clip).collect(policy_of([1], of), 0)
+        Collector(TASK, [1], of.root_seed, RolloutLayout(192, 50), clip_actions=clip).collect(policy_of([1], of), 0)
         for clip in (False, True)
     )
     first = raw.action[:, :, 0]
@@ -122,12 +122,12 @@ def test_clipped_actions_are_stepped_and_charged_and_the_loss_sees_the_sample():
 
 @pytest.mark.parametrize(("steps", "lengths"), [(2048, [50] * 40 + [48]), (100, [50, 50]), (7, [7]), (51, [50, 1])])
 def test_plan_lays_the_steps_out_in_lanes(steps, lengths):
-    plan = Plan(steps, 50)
-    assert plan.lengths.tolist() == lengths
-    assert plan.lanes == len(lengths)
-    assert plan.episodes == lengths.count(50)
-    assert plan.sequence(plan.order[None])[0].tolist() == list(range(steps))
-    assert np.flatnonzero(plan.sequence(plan.ends[None])[0]).tolist() == [
+    layout = RolloutLayout(steps, 50)
+    assert layout.lengths.tolist() == lengths
+    assert layout.lanes == len(lengths)
+    assert layout.episodes == lengths.count(50)
+    assert layout.sequence(layout.order[None])[0].tolist() == list(range(steps))
+    assert np.flatnonzero(layout.sequence(layout.episode_ends[None])[0]).tolist() == [
         sum(lengths[: n + 1]) - 1 for n in range(len(lengths))
     ]
-    assert plan.ends.sum() == len(lengths)
+    assert layout.episode_ends.sum() == len(lengths)

@@ -10,7 +10,7 @@ import torch
 from cells import fresh_policy, small
 from toys import point_mass
 
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.jobs.checkpoint import load_checkpoint, save_checkpoint
 from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Shaping, Variant
 from reacher_shaping.storage import block_schemas
@@ -20,7 +20,7 @@ from reacher_shaping.tasks.reacher import TASK
 from reacher_shaping.training import schedules
 from reacher_shaping.training.alignment import alignment
 from reacher_shaping.training.records import Schedule
-from reacher_shaping.training.rollout import Collector, Plan
+from reacher_shaping.training.rollout import Collector, RolloutLayout
 from reacher_shaping.training.train import _outputs, train
 
 FALLING = Schedule(
@@ -51,7 +51,7 @@ def toy_cell(*, task="reacher", schedule="constant", alpha0=1.0, iterations=4, *
 
 
 def trained(cell, seeds, state=None, iterations=None, radius=0.1):
-    for found in train(cell, seeds, radius=radius, state=state):
+    for found in train(cell, seeds, success_radius=radius, state=state):
         if found.iteration == iterations:
             break
     return found
@@ -83,14 +83,9 @@ def test_the_toy_task_is_learned_and_evaluated():
     assert (state.progress["episode_length"] == 30).all()
     first, last = state.episode_returns[:, :4].mean((1, 2)), state.episode_returns[:, -4:].mean((1, 2))
     assert (last > 0.6 * first).all(), "returns are negative"
-    rows = evaluate(
-        state.policy().act, [0, 1], mode="deterministic", episodes=50, radius=0.1,
-        environment=cell.protocol.environment, root_seed=1,
-    )  # fmt: skip
-    still = evaluate(
-        lambda observation, noise: np.zeros((*observation.shape[:2], 1)), [0], mode="deterministic", episodes=50,
-        radius=0.1, environment=cell.protocol.environment, root_seed=1,
-    )  # fmt: skip
+    conditions = Conditions(cell.protocol.environment, 1, 0.1, episodes=50, mode="deterministic")
+    rows = evaluate(state.policy().act, [0, 1], conditions)
+    still = evaluate(lambda observation, noise: np.zeros((*observation.shape[:2], 1)), [0], conditions)
     assert rows["final_distance"].mean() < 0.5 * still["final_distance"].mean()
 
 
@@ -119,7 +114,7 @@ def test_a_weight_with_a_state_shapes_with_what_it_was_in_the_iteration():
 
 def test_a_seeds_weight_is_the_same_in_every_block():
     both, alone = (trained(toy_cell(schedule="falling"), seeds, radius=0.15) for seeds in ([0, 1], [1]))
-    assert torch.equal(both.rows[1], alone.rows[0])
+    assert torch.equal(both.parameters[1], alone.parameters[0])
     np.testing.assert_array_equal(both.progress["alpha"][1], alone.progress["alpha"][0])
 
 
@@ -130,7 +125,7 @@ def test_the_state_of_a_weight_survives_a_checkpoint(tmp_path):
     save_checkpoint(path, trained(cell, [0, 1], radius=0.15, iterations=2))
     kept, _ = load_checkpoint(path)
     resumed = trained(cell, [0, 1], state=kept, radius=0.15)
-    assert torch.equal(resumed.rows, whole.rows)
+    assert torch.equal(resumed.parameters, whole.parameters)
     pd.testing.assert_frame_equal(resumed.progress_frame(), whole.progress_frame(), check_exact=True)
 
 
@@ -153,22 +148,22 @@ def test_what_adapts_survives_a_kill_with_the_same_bits_in_every_block(variant, 
     path = tmp_path / "key" / "checkpoint.pt"
     save_checkpoint(path, trained(cell, [0, 1], radius=0.15, iterations=3))
     resumed = trained(cell, [0, 1], state=load_checkpoint(path)[0], radius=0.15)
-    assert torch.equal(resumed.rows, state.rows)
+    assert torch.equal(resumed.parameters, state.parameters)
     pd.testing.assert_frame_equal(resumed.progress_frame(), state.progress_frame(), check_exact=True)
     alone = trained(cell, [1], radius=0.15)
-    assert torch.equal(alone.rows[0], state.rows[1])
+    assert torch.equal(alone.parameters[0], state.parameters[1])
     np.testing.assert_array_equal(alone.progress["alpha"][0], state.progress["alpha"][1])
 
 
 def test_the_alignment_is_the_cosine_of_the_policy_gradients_that_autograd_gives():
     """One network of torch.nn a seed; rewards to come summed plainly, episode by episode."""
     cell = small("l2", alpha0=3.0)
-    policy, plan = fresh_policy([0, 1], 7), Plan(192, 50)
-    rollout = Collector(TASK, [0, 1], 7, plan).collect(policy, 0)
+    policy, layout = fresh_policy([0, 1], 7), RolloutLayout(192, 50)
+    rollout = Collector(TASK, [0, 1], 7, layout).collect(policy, 0)
     rng = np.random.default_rng(0)
     reward, shaping = rng.normal(size=(2, 2, 4, 50))
     features, log_prob, _ = _outputs(policy, rollout)
-    found = alignment(policy, features, rollout.action, log_prob, reward, shaping, plan, cell.protocol.ppo)
+    found = alignment(policy, features, rollout.action, log_prob, reward, shaping, layout, cell.protocol.ppo)
     for seed in range(2):
         network = plain_loop.Network()
         network.load_state_dict({name: tensor[seed] for name, tensor in policy.weights().items()})
@@ -176,12 +171,12 @@ def test_the_alignment_is_the_cosine_of_the_policy_gradients_that_autograd_gives
         gradients = []
         for terms, decay in ((reward[seed], 0.99), (shaping[seed], 0.99 * 0.95)):
             to_come = np.zeros((4, 50))
-            for lane, length in enumerate(plan.lengths):
+            for lane, length in enumerate(layout.lengths):
                 for t in range(length):
                     to_come[lane, t] = sum(decay ** (k - t) * terms[lane, k] for k in range(t, length))
             to_come -= to_come[:3].mean(0)
             network.zero_grad()
-            for lane, length in enumerate(plan.lengths):
+            for lane, length in enumerate(layout.lengths):
                 distribution, _ = network(torch.from_numpy(rollout.observation[seed, lane, :length]))
                 chosen = torch.from_numpy(rollout.action[seed, lane, :length]).double()
                 (distribution.log_prob(chosen).sum(-1) * torch.from_numpy(to_come[lane, :length])).sum().backward()
@@ -190,5 +185,5 @@ def test_the_alignment_is_the_cosine_of_the_policy_gradients_that_autograd_gives
         expected = torch.nn.functional.cosine_similarity(*gradients, dim=0).item()
         assert found[seed] == pytest.approx(expected, abs=1e-4)
         assert abs(expected) > 1e-3
-    same = alignment(policy, features, rollout.action, log_prob, reward, 0 * shaping, plan, cell.protocol.ppo)
+    same = alignment(policy, features, rollout.action, log_prob, reward, 0 * shaping, layout, cell.protocol.ppo)
     assert same.tolist() == [0, 0]

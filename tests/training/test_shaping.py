@@ -32,9 +32,9 @@ def alpha(variant, alpha0, env_steps):
 def shaping_terms(distance, variant, *, alpha0=1.0, discount=0.99, start=0, **settings):
     """F [T] of one lane of T steps."""
     steps = len(distance) - 1
-    ends = (np.arange(steps) == steps - 1)[None]
+    episode_ends = (np.arange(steps) == steps - 1)[None]
     shaping = rule(variant, alpha0=alpha0, discount=discount, **settings)
-    return shaping.reward(np.asarray(distance)[None, None], (start + np.arange(steps))[None], ends, {})[0, 0]
+    return shaping.reward(np.asarray(distance)[None, None], (start + np.arange(steps))[None], episode_ends, {})[0, 0]
 
 
 def discounted_sum(terms, discount):
@@ -113,9 +113,9 @@ def test_zero_terminal_potential_leaves_only_the_first_potential(distance, name,
 def test_only_a_lanes_own_last_step_is_an_end():
     """Two lanes, the second cut after two of three steps."""
     distance = np.array([[[0.4, 0.3, 0.2, 0.1], [0.4, 0.3, 0.2, 9.0]]])
-    ends = np.array([[False, False, True], [False, True, False]])
+    episode_ends = np.array([[False, False, True], [False, True, False]])
     shaping = rule(VARIANTS["l2"], discount=1.0, terminal_potential="zero")
-    terms = shaping.reward(distance, np.arange(6).reshape(2, 3), ends, {})
+    terms = shaping.reward(distance, np.arange(6).reshape(2, 3), episode_ends, {})
     np.testing.assert_allclose(terms[0, 0], [0.1, 0.1, 0.2])
     np.testing.assert_allclose(terms[0, 1, :2], [0.1, 0.3])
 
@@ -144,15 +144,15 @@ def advantages_two_ways(*, gae_lambda, episode_end, terminal_potential, alpha0=5
     rng = np.random.default_rng(0)
     distance, values = rng.uniform(0, 0.4, (2, 3, 11)), rng.normal(0, 20, (2, 3, 11))
     reward = rng.normal(size=(2, 3, 10))
-    ends = np.array([[False] * 9 + [True]] * 2 + [[False] * 6 + [True] + [False] * 3])
+    episode_ends = np.array([[False] * 9 + [True]] * 2 + [[False] * 6 + [True] + [False] * 3])
     shaping = rule(
         VARIANTS["l2"], alpha0=alpha0, discount=discount, episode_end=episode_end, terminal_potential=terminal_potential
     )
-    shaped = reward + shaping.reward(distance, np.arange(30).reshape(3, 10), ends, {})
-    settings = {"ends": ends, "discount": discount, "gae_lambda": gae_lambda}
+    shaped = reward + shaping.reward(distance, np.arange(30).reshape(3, 10), episode_ends, {})
+    settings = {"episode_ends": episode_ends, "discount": discount, "gae_lambda": gae_lambda}
     offset = values - alpha0 * distance
     ways = (
-        gae(rewards, worth[..., :-1], next_values(worth, ends, episode_end), **settings)
+        gae(rewards, worth[..., :-1], next_values(worth, episode_ends, episode_end), **settings)
         for rewards, worth in ((shaped, values), (reward, offset))
     )
     taken = np.array([[True] * 10] * 2 + [[True] * 7 + [False] * 3])
@@ -204,10 +204,10 @@ def test_heuristic_guided_learning_is_temporal_difference_towards_the_guess_wher
     """With l = 0 a step is judged by its reward and the guess of the state it leads to, and by nothing after it."""
     shaping = rule(VARIANTS["l2"], alpha0=5.0, discount=0.9, form="hurl", mixing=1.0, episode_end="bootstrap")
     distance, values = np.random.default_rng(0).uniform(0, 1, (2, 1, 1, 4))
-    reward, ends = np.zeros((1, 1, 3)), np.array([[False, False, True]])
-    shaped = reward + shaping.reward(distance, np.arange(3)[None], ends, {})
+    reward, episode_ends = np.zeros((1, 1, 3)), np.array([[False, False, True]])
+    shaped = reward + shaping.reward(distance, np.arange(3)[None], episode_ends, {})
     advantages = gae(
-        shaped, values[..., :-1], values[..., 1:], ends, discount=shaping.discount_at({}, 0), gae_lambda=0.95
+        shaped, values[..., :-1], values[..., 1:], episode_ends, discount=shaping.discount_at({}, 0), gae_lambda=0.95
     )
     np.testing.assert_allclose(advantages, 0.9 * 5 * -distance[..., 1:] - values[..., :-1])
 
@@ -257,10 +257,10 @@ def test_a_learned_potential_becomes_the_value_of_a_task_that_the_distance_tells
 def test_a_learned_potential_shapes_as_one_that_is_given():
     """With the knots on a line through 0 it is a multiple of the distance."""
     distance = np.random.default_rng(0).uniform(0, 0.6, (1, 2, 5))
-    ends = np.array([[False] * 3 + [True]] * 2)
+    episode_ends = np.array([[False] * 3 + [True]] * 2)
     given_one, learned_one = (rule(VARIANTS[name], alpha0=5.0, terminal_potential="zero") for name in ("l2", "learned"))
     steps = np.arange(8).reshape(2, 4)
-    terms = learned_one.reward(distance, steps, ends, {"knots": -np.array([KNOTS])})
-    np.testing.assert_allclose(terms, given_one.reward(distance, steps, ends, {}), atol=1e-14)
+    terms = learned_one.reward(distance, steps, episode_ends, {"knots": -np.array([KNOTS])})
+    np.testing.assert_allclose(terms, given_one.reward(distance, steps, episode_ends, {}), atol=1e-14)
     assert learned_one.learns
     assert not given_one.learns

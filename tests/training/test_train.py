@@ -18,7 +18,7 @@ SPARSE = {"reward": "sparse", "success_radius": 0.15, "control_weight": 0.1}
 
 def trained(of, seeds, state=None, iterations=None):
     """The state after all, or the first `iterations`, iterations."""
-    for found in train(of, seeds, radius=RADIUS, state=state):
+    for found in train(of, seeds, success_radius=RADIUS, state=state):
         if found.iteration == iterations:
             break
     return found
@@ -85,7 +85,9 @@ def test_three_iterations_equal_the_plain_loop(of):
     Two seeds in the engine, one of them by the plain loop.
     """
     radius = of.protocol.environment.radius(RADIUS)
-    for state, (network, recording) in zip(train(of, [4, 1], radius=radius), plain_loop.train(of, 1), strict=True):
+    for state, (network, recording) in zip(
+        train(of, [4, 1], success_radius=radius), plain_loop.train(of, 1), strict=True
+    ):
         error = weight_error(state, of, 1, network)
         assert error < 2e-5
         assert error < 0.01 * moved(network, of, 1)
@@ -130,7 +132,7 @@ def test_the_released_log_equals_a_running_sum_over_the_plain_loop(steps):
     """Of 3 episodes the first, with 42 steps left over from the rollout before, is among the last ten; of 40 not."""
     of = small("l2", alpha0=5.0, iterations=3, rollout_steps=steps, log={"episode_return": "released"}, epochs=1)
     recordings = []
-    for state, (_, recording) in zip(train(of, [1], radius=RADIUS), plain_loop.train(of, 1), strict=True):
+    for state, (_, recording) in zip(train(of, [1], success_radius=RADIUS), plain_loop.train(of, 1), strict=True):
         recordings.append(recording)
         found = state.progress["logged_return"][0, state.iteration - 1]
         assert found == pytest.approx(plain_loop.released_log(of, recordings), rel=1e-5)
@@ -154,7 +156,7 @@ def test_a_seed_trains_the_same_bits_in_every_block(alone, block):
     of = cell("decay", iterations=2, epochs=2)
     state = trained(of, block)
     row = block.index(3)
-    assert torch.equal(state.rows[row], alone.rows[0])
+    assert torch.equal(state.parameters[row], alone.parameters[0])
     assert torch.equal(state.adam.second[row], alone.adam.second[0])
     for ours, expected in (
         (state.progress_frame(), alone.progress_frame()),
@@ -166,7 +168,7 @@ def test_a_seed_trains_the_same_bits_in_every_block(alone, block):
 
 def test_the_same_training_twice_gives_the_same_bits(alone):
     again = trained(cell("decay", iterations=2, epochs=2), [3])
-    assert torch.equal(again.rows, alone.rows)
+    assert torch.equal(again.parameters, alone.parameters)
     pd.testing.assert_frame_equal(again.progress_frame(), alone.progress_frame(), check_exact=True)
 
 
@@ -178,7 +180,7 @@ def test_going_on_from_a_state_equals_an_uninterrupted_run():
         assert kept.iteration == stop
         resumed = trained(of, [0, 1], state=kept)
         assert resumed.iteration == 5
-        assert torch.equal(resumed.rows, whole.rows)
+        assert torch.equal(resumed.parameters, whole.parameters)
         assert torch.equal(resumed.adam.first, whole.adam.first)
         assert resumed.adam.steps == whole.adam.steps
         pd.testing.assert_frame_equal(resumed.progress_frame(), whole.progress_frame(), check_exact=True)
@@ -187,16 +189,16 @@ def test_going_on_from_a_state_equals_an_uninterrupted_run():
 
 def test_a_longer_budget_starts_with_the_shorter_one():
     short, long = (trained(small("decay", iterations=n), [0], iterations=2) for n in (2, 4))
-    assert torch.equal(short.rows, long.rows)
+    assert torch.equal(short.parameters, long.parameters)
 
 
 def test_seeds_and_roots_give_different_runs_and_variants_share_their_first_rollout():
-    rows = [trained(small(root_seed=root), [seed], iterations=1).rows for root, seed in ((7, 0), (7, 1), (8, 0))]
+    rows = [trained(small(root_seed=root), [seed], iterations=1).parameters for root, seed in ((7, 0), (7, 1), (8, 0))]
     assert not torch.equal(rows[0], rows[1])
     assert not torch.equal(rows[0], rows[2])
     none, l2 = (trained(small(variant), [0], iterations=1) for variant in ("none", "l2"))
     np.testing.assert_array_equal(none.episode_returns[:, 0], l2.episode_returns[:, 0])
-    assert not torch.equal(none.rows, l2.rows)
+    assert not torch.equal(none.parameters, l2.parameters)
 
 
 def test_a_diverged_seed_is_named_and_changes_nothing_in_the_others():
@@ -204,10 +206,10 @@ def test_a_diverged_seed_is_named_and_changes_nothing_in_the_others():
     clean = trained(of, [5, 6, 7])
     assert clean.diverged() == []
     state = copy.deepcopy(trained(of, [5, 6, 7], iterations=1))
-    state.rows[1, 17] = math.nan
+    state.parameters[1, 17] = math.nan
     state = trained(of, [5, 6, 7], state=state)
     assert state.diverged() == [6]
-    assert torch.equal(state.rows[[0, 2]], clean.rows[[0, 2]])
+    assert torch.equal(state.parameters[[0, 2]], clean.parameters[[0, 2]])
     others = [frame[frame["seed"] != 6] for frame in (state.progress_frame(), clean.progress_frame())]
     pd.testing.assert_frame_equal(*others, check_exact=True)
     assert np.isfinite(others[0].to_numpy()).all()

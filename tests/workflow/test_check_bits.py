@@ -34,7 +34,7 @@ def check(path):
 
 def test_a_block_with_the_published_bits_is_equal_and_any_other_is_not(tmp_path):
     published, path = published_bits([block()]), tmp_path / "bits.json"
-    *_, state = train(small("none", iterations=1), [0, 1], radius=0.02)
+    *_, state = train(small("none", iterations=1), [0, 1], success_radius=0.02)
     weights = state.policy().weights()
     path.write_text(json.dumps(published | {"weights": weights_checksum(weights)}))
     done = check(path)
@@ -56,7 +56,7 @@ def test_without_published_bits_one_line_says_so(tmp_path):
 
 
 def test_one_bit_of_one_weight_changes_the_checksum():
-    *_, state = train(small("none", iterations=1), [0], radius=0.02)
+    *_, state = train(small("none", iterations=1), [0], success_radius=0.02)
     weights = state.policy().weights()
     before = weights_checksum(weights)
     weights["log_std"].view(torch.int32)[0, 0] ^= 1

@@ -1,12 +1,13 @@
 """Evaluate the policies of one seed block, stochastic and deterministic, on the same resets."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 from job import logged
 
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, Mode, evaluate
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import block_schemas
@@ -24,18 +25,9 @@ environment = Environment.model_validate_json(params.environment)
 with logged(snakemake):
     trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training, json.loads(params.asked)))
     policy = Policy.from_weights(trained.weights, load_task(environment.task))
-    frames = [
-        evaluate(
-            policy.act,
-            trained.seeds,
-            mode=mode,
-            episodes=evaluation.episodes,
-            radius=evaluation.radius,
-            environment=environment,
-            root_seed=params.root_seed,
-        )
-        for mode in ("stochastic", "deterministic")
-    ]
+    conditions = Conditions(environment, params.root_seed, evaluation.radius, evaluation.episodes)
+    modes: tuple[Mode, ...] = ("stochastic", "deterministic")
+    frames = [evaluate(policy.act, trained.seeds, replace(conditions, mode=mode)) for mode in modes]
     episodes = pd.concat(frames, ignore_index=True)
     write_table(snakemake.output.episodes, episodes, block_schemas.EPISODES)
     files = [Path(snakemake.output.episodes)]

@@ -6,6 +6,7 @@ import pandas as pd
 from job import logged
 
 from reacher_shaping.evaluation.controllers import evaluate_controllers
+from reacher_shaping.evaluation.evaluate import Conditions
 from reacher_shaping.settings.cell import Protocol
 from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import schemas
@@ -18,11 +19,13 @@ protocols = [Protocol.model_validate(settings) for settings in json.loads(params
 with logged(snakemake):
     rows = [
         evaluate_controllers(
-            episodes=evaluation.episodes,
-            radius=protocol.environment.radius(evaluation.radius),
-            environment=protocol.environment,
-            network=protocol.ppo,
-            root_seed=params.root_seed,
+            Conditions(
+                protocol.environment,
+                params.root_seed,
+                protocol.environment.radius(evaluation.radius),
+                evaluation.episodes,
+            ),
+            protocol.ppo,
         ).assign(protocol=protocol.name)
         for protocol in protocols
     ]

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from job import logged
 
-from reacher_shaping.evaluation.episode_lengths import evaluate_lengths
+from reacher_shaping.evaluation.episode_lengths import EPISODES, evaluate_lengths
+from reacher_shaping.evaluation.evaluate import Conditions
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.storage import block_schemas
@@ -17,6 +18,7 @@ from reacher_shaping.training.policy import Policy
 
 record = Record()
 params, output = snakemake.params, snakemake.output
+evaluation = Evaluation.model_validate_json(params.evaluation)
 environment = Environment.model_validate_json(params.environment)
 
 with logged(snakemake):
@@ -24,10 +26,7 @@ with logged(snakemake):
     long = evaluate_lengths(
         Policy.from_weights(trained.weights, load_task(environment.task)).act,
         trained.seeds,
-        mode="stochastic",
-        radius=Evaluation.model_validate_json(params.evaluation).radius,
-        environment=environment,
-        root_seed=params.root_seed,
+        Conditions(environment, params.root_seed, evaluation.radius, EPISODES),
     )
     write_table(output.episodes, long, block_schemas.LONG_EPISODES)
     steps = int((long["steps"] * long["episodes"]).sum())

@@ -5,6 +5,7 @@ import json
 from job import logged
 
 from reacher_shaping.evaluation import video
+from reacher_shaping.evaluation.evaluate import Conditions
 from reacher_shaping.settings.cell import Environment
 from reacher_shaping.storage.policy_format import read_policy
 from reacher_shaping.storage.provenance import unchanged
@@ -19,12 +20,7 @@ with logged(snakemake):
     weights = {name: tensor[:1] for name, tensor in trained.weights.items()}
     first = Policy.from_weights(weights, load_task(environment.task))
     episode = video.evaluation_episode(
-        first.act,
-        trained.seeds[0],
-        mode="stochastic",
-        radius=params.radius,
-        environment=environment,
-        root_seed=params.root_seed,
+        first.act, trained.seeds[0], Conditions(environment, params.root_seed, params.radius, episodes=1)
     )
     pictures = video.frames(episode, f"{snakemake.wildcards.name}, seed {trained.seeds[0]}")
     video.write_video(snakemake.output.gif, pictures)

@@ -27,7 +27,10 @@ def measure(values: search.Values) -> search.Values:
     """Train and evaluate one trial."""
     cell = spec.cell(protocol, variant, values)
     return search.score(
-        cell, spec.seeds, episodes=evaluation.episodes, radius=cell.protocol.environment.radius(evaluation.radius)
+        cell,
+        spec.seeds,
+        episodes=evaluation.episodes,
+        success_radius=cell.protocol.environment.radius(evaluation.radius),
     )
 
 

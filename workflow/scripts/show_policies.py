@@ -7,6 +7,7 @@ from typing import Any
 from job import logged
 
 from reacher_shaping.evaluation import shown_policies
+from reacher_shaping.evaluation.evaluate import Conditions, Mode
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.storage.files import read_json, write_json
 from reacher_shaping.storage.policy_format import read_policy, weights_checksum, write_policy
@@ -16,7 +17,10 @@ from reacher_shaping.training.policy import Policy
 
 params = snakemake.params
 folder = Path(snakemake.output.summary).parent
-how = {"episodes": params.episodes, "radius": params.radius}
+
+
+def conditions(cell: Cell, mode: Mode) -> Conditions:
+    return Conditions(cell.protocol.environment, cell.root_seed, params.radius, params.episodes, mode)
 
 
 def kept(
@@ -26,7 +30,7 @@ def kept(
     write_policy(folder / f"{name}.pt", [seed], weights, settings)
     act = Policy.from_weights(weights, load_task(cell.protocol.environment.task)).act
     told = {"cell": cell.name, "seed": seed, "weights": weights_checksum(weights), **provenance}
-    return told | shown_policies.measured(act, cell, mode="stochastic", **how)
+    return told | shown_policies.measured(act, conditions(cell, "stochastic"))
 
 
 with logged(snakemake) as say:
@@ -47,5 +51,6 @@ with logged(snakemake) as say:
         say(f"{name}: seed {seed} of {cell.name}")
     if shown:
         act, numbers = shown_policies.controller(reference)
-        shown["controller"] = {"gains": numbers} | shown_policies.measured(act, reference, mode="deterministic", **how)
+        told = shown_policies.measured(act, conditions(reference, "deterministic"))
+        shown["controller"] = {"gains": numbers} | told
     write_json(snakemake.output.summary, shown)

@@ -28,21 +28,21 @@ block = Path(output.policy).parent
 key = hashlib.sha256(
     json.dumps([params.cell, params.seeds, params.code, kernels(), exact_versions()]).encode()
 ).hexdigest()[:16]
-radius = cell.protocol.environment.radius(RADIUS)
-settings = {"cell": cell.settings(), "radius": radius}
+success_radius = cell.protocol.environment.radius(RADIUS)
+settings = {"cell": cell.settings(), "radius": success_radius}
 
 with logged(snakemake) as say:
     checkpoints = Path("results/.checkpoints") / key
     store = CheckpointStore(snakemake.resources.checkpoints.removeprefix("local"))
     with training_job.trained_block(
-        cell, params.seeds, radius=radius, folder=checkpoints, report=say, record=record, store=store
+        cell, params.seeds, success_radius=success_radius, folder=checkpoints, report=say, record=record, store=store
     ) as (state, _):
         weights = state.policy().weights()
         write_policy(output.policy, params.seeds, weights, settings)
         write_table(output.progress, state.progress_frame(), block_schemas.PROGRESS)
         write_monitors(output.monitor, state.episodes_frame(), task.gymnasium_id, task.step_seconds)
         files = [Path(output.policy), Path(output.progress), *sorted(Path(output.monitor).iterdir())]
-        steps = state.iteration * state.plan.steps * len(params.seeds)
+        steps = state.iteration * state.layout.steps * len(params.seeds)
         training = record.to_dict(block, reached_files(__file__, cell.chosen_code), files, steps, snakemake.threads)
         who = {"settings": settings, "seeds": params.seeds, "code": params.code, "diverged": state.diverged()}
         write_json(output.training, {**who, "weights": weights_checksum(weights), **training})

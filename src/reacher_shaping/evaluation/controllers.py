@@ -5,6 +5,7 @@ actions [S, L, A]. They are evaluated on the resets, and with the draws, of the 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats as distributions
 
-from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
-from reacher_shaping.settings.cell import PPO, Environment
+from reacher_shaping.evaluation.evaluate import Actor, Conditions, Mode, evaluate
+from reacher_shaping.settings.cell import PPO
 from reacher_shaping.stats import wilson_interval
 from reacher_shaping.tasks.base import load_task
 from reacher_shaping.training.network import Shape
@@ -109,21 +110,15 @@ def tip_position(angles: Array) -> Array:
     return position
 
 
-def evaluate_controllers(
-    *,
-    episodes: int,
-    radius: float,
-    environment: Environment,
-    root_seed: int,
-    network: PPO | None = None,
-) -> pd.DataFrame:
-    """Evaluate all reference policies; the arguments are those of `evaluate.evaluate`, and the untrained network's.
+def evaluate_controllers(conditions: Conditions, network: PPO | None = None) -> pd.DataFrame:
+    """Evaluate all reference policies, each in its own mode; `network` are the settings of the untrained one.
 
     Returns a row per controller: `controller, mode, episodes, control_weight`, then `success_rate` with its 95 %
     Wilson interval `success_low, success_high`, `mean_return` with its 95 % t interval `mean_return_low,
     mean_return_high`, and the means `final_success_rate, final_distance, min_distance` (m), `reward_distance,
     reward_control`. Both intervals are over episodes.
     """
+    environment, root_seed = conditions.environment, conditions.root_seed
     task, control_weight = load_task(environment.task), environment.control_weight
     gains = TUNED_GAINS[min(TUNED_GAINS, key=lambda weight: abs(weight - control_weight))]
     actors: Sequence[tuple[str, Mode, Actor]] = [
@@ -138,16 +133,8 @@ def evaluate_controllers(
         actors = actors[:-1]
     rows = []
     for name, mode, act in actors:
-        frame = evaluate(
-            act,
-            [0],
-            mode=mode,
-            episodes=episodes,
-            radius=radius,
-            environment=environment,
-            root_seed=root_seed,
-        )
-        row = {"controller": name, "mode": mode, "episodes": episodes, "control_weight": control_weight}
+        frame = evaluate(act, [0], replace(conditions, mode=mode))
+        row = {"controller": name, "mode": mode, "episodes": conditions.episodes, "control_weight": control_weight}
         rows.append(row | _summary(frame))
     return pd.DataFrame(rows)
 

@@ -1,11 +1,11 @@
 """What trained policies do on episodes longer than the 50 steps they were trained on."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pandas as pd
 
-from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
-from reacher_shaping.settings.cell import Environment
+from reacher_shaping.evaluation.evaluate import Actor, Conditions, evaluate
 
 LENGTHS = (50, 100, 200, 500)
 """Environment steps of an episode; 50 is Reacher-v5's own, 500 are 10 simulated seconds."""
@@ -14,43 +14,25 @@ EPISODES = 50
 
 
 def evaluate_lengths(
-    act: Actor,
-    seeds: Sequence[int],
-    *,
-    mode: Mode,
-    radius: float,
-    environment: Environment,
-    root_seed: int,
-    episodes: int = EPISODES,
-    lengths: Sequence[int] = LENGTHS,
+    act: Actor, seeds: Sequence[int], conditions: Conditions, lengths: Sequence[int] = LENGTHS
 ) -> pd.DataFrame:
-    """Return a row per seed and length; the other arguments are those of `evaluate.evaluate`.
+    """Return a row per seed and length, under conditions that are equal but for it.
 
-    Columns: `seed, mode, steps, episodes`, then means over the episodes: `success_rate` (within `radius` m after any
-    step), `final_success_rate`, `final_distance` (m), `return_per_step`, and `share_within_radius`, the share of
-    steps that ended within `radius`. The targets are the same for all lengths; with 50 steps the episodes are the
+    Columns: `seed, mode, steps, episodes`, then means over the episodes: `success_rate` (within the success radius
+    after any step), `final_success_rate`, `final_distance` (m), `return_per_step`, and `share_within_radius`, the share
+    of steps that ended within it. The targets are the same for all lengths; with 50 steps the episodes are the
     first of the study's evaluation.
     """
     rows = []
     for steps in lengths:
-        frame = evaluate(
-            act,
-            seeds,
-            mode=mode,
-            episodes=episodes,
-            radius=radius,
-            environment=environment,
-            root_seed=root_seed,
-            steps=steps,
-        )
-        grouped = frame.groupby("seed", sort=False)
+        grouped = evaluate(act, seeds, replace(conditions, steps=steps)).groupby("seed", sort=False)
         rows.append(
             pd.DataFrame(
                 {
                     "seed": list(seeds),
-                    "mode": mode,
+                    "mode": conditions.mode,
                     "steps": steps,
-                    "episodes": episodes,
+                    "episodes": conditions.episodes,
                     "success_rate": grouped["success"].mean().to_numpy(),
                     "final_success_rate": grouped["final_success"].mean().to_numpy(),
                     "final_distance": grouped["final_distance"].mean().to_numpy(),

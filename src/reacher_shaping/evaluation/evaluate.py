@@ -5,6 +5,7 @@ comparisons are paired by episode.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -23,41 +24,45 @@ LANES_PER_SEED = 50
 """Episodes of one seed that run side by side; fixed, so that results never depend on a chunk's size."""
 
 
-def evaluate(
-    act: Actor,
-    seeds: Sequence[int],
-    *,
-    mode: Mode,
-    episodes: int,
-    radius: float,
-    environment: Environment,
-    root_seed: int,
-    steps: int | None = None,
-) -> pd.DataFrame:
-    """Return the columns of `episodes.parquet`, a row per seed and episode, ordered by seed.
+@dataclass(frozen=True)
+class Conditions:
+    """What policies meet in an evaluation; those that are compared meet the same.
 
-    Args:
-        act: the policies of all seeds.
-        seeds: names of the S policies in the rows.
-        mode: "stochastic" samples actions (the paper's evaluation), "deterministic" takes the mean.
-        episodes: episodes a seed.
-        radius: m; success is a distance of at most `radius` after any step, final success after the last.
+    Attributes:
         environment: the task, its reward, and whether actions are clipped to the task's limit before the step, so that
             the control cost is on the clipped.
         root_seed: keys the resets and the noise, common to all policies.
+        success_radius: m; success is a distance of at most this after any step, final success after the last.
+        episodes: episodes a seed.
+        mode: "stochastic" samples actions (the paper's evaluation), "deterministic" takes the mean.
         steps: length of an episode; None for the task's own.
     """
+
+    environment: Environment
+    root_seed: int
+    success_radius: float
+    episodes: int
+    mode: Mode = "stochastic"
+    steps: int | None = None
+
+
+def evaluate(act: Actor, seeds: Sequence[int], conditions: Conditions) -> pd.DataFrame:
+    """Return the columns of `episodes.parquet`, a row per seed and episode, ordered by seed.
+
+    `act` are the policies of all S `seeds`, their names in the rows.
+    """
+    environment, episodes = conditions.environment, conditions.episodes
     task = load_task(environment.task)
-    steps = steps or task.episode_steps
-    lanes = Lanes(task, len(seeds) * LANES_PER_SEED)
+    steps = conditions.steps or task.episode_steps
+    lanes, stochastic = Lanes(task, len(seeds) * LANES_PER_SEED), conditions.mode == "stochastic"
     shape = (len(seeds), LANES_PER_SEED)
     chunks = []
-    for resets, noise in _chunks(task, episodes, steps, root_seed):
+    for resets, noise in _chunks(task, episodes, steps, conditions.root_seed):
         measured = np.empty((*shape, steps, len(task.measures)))
         control = np.empty((*shape, steps))
         lanes.reset(resets * len(seeds))
         for t in range(steps):
-            draws = np.broadcast_to(noise[:, t], (*shape, task.action_size)).copy() if mode == "stochastic" else None
+            draws = np.broadcast_to(noise[:, t], (*shape, task.action_size)).copy() if stochastic else None
             action = act(lanes.observation.reshape(*shape, -1), draws)
             if environment.clip_actions:
                 action = action.clip(-task.action_limit, task.action_limit)
@@ -66,8 +71,10 @@ def evaluate(
             control[..., t] = environment.control_weight * control_cost(action)
         chunks.append((measured, control))
     measured, control = (np.concatenate(parts, axis=1)[:, :episodes] for parts in zip(*chunks, strict=True))
-    reward = task.rewards[environment.reward](measured, 0.0, control_weight=0.0, success_radius=radius)
-    return _rows(reward, control, measured[..., 0], seeds, mode, radius)
+    reward = task.rewards[environment.reward](
+        measured, 0.0, control_weight=0.0, success_radius=conditions.success_radius
+    )
+    return _rows(reward, control, measured[..., 0], seeds, conditions)
 
 
 def _chunks(task: Task, episodes: int, steps: int, root_seed: int) -> Iterator[tuple[list[Array], NDArray[np.float32]]]:
@@ -79,12 +86,10 @@ def _chunks(task: Task, episodes: int, steps: int, root_seed: int) -> Iterator[t
         yield [task.draw_reset(resets) for _ in range(LANES_PER_SEED)], draws
 
 
-def _rows(
-    reward: Array, control: Array, distance: Array, seeds: Sequence[int], mode: Mode, radius: float
-) -> pd.DataFrame:
+def _rows(reward: Array, control: Array, distance: Array, seeds: Sequence[int], conditions: Conditions) -> pd.DataFrame:
     """Return the rows of episodes given rewards but for control, weighted control costs, and distances [S, E, T]."""
     count, episodes, _ = distance.shape
-    hit = distance <= radius
+    hit = distance <= conditions.success_radius
     success = hit.any(-1)
     first = pd.array(hit.argmax(-1).ravel() + 1, dtype="Int32")
     first[~success.ravel()] = pd.NA
@@ -92,7 +97,7 @@ def _rows(
     return pd.DataFrame(
         {
             "seed": np.repeat(seeds, episodes),
-            "mode": mode,
+            "mode": conditions.mode,
             "episode": np.tile(np.arange(episodes), count),
             "episode_return": (reward_distance + reward_control).ravel(),
             "reward_distance": reward_distance.ravel(),

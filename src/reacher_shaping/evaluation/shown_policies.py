@@ -7,7 +7,7 @@ import numpy as np
 from torch import Tensor
 
 from reacher_shaping.evaluation import controllers
-from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
+from reacher_shaping.evaluation.evaluate import Actor, Conditions, evaluate
 from reacher_shaping.evaluation.video import evaluation_episode
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.tasks.base import load_task
@@ -30,19 +30,17 @@ def controller(cell: Cell) -> tuple[Actor, list[float]]:
     return controllers.reach(gains), [*gains, controllers.ELBOW_LIMIT]
 
 
-def measured(act: Actor, cell: Cell, *, mode: Mode, episodes: int, radius: float) -> dict[str, Any]:
+def measured(act: Actor, conditions: Conditions) -> dict[str, Any]:
     """What a policy of one run did: the shares of episodes that `touched` the target and that `ended` on it.
 
     `target` [x, y] and `path`, where the fingertip was at the start and after each step, `x,y x,y ...`, are of the
     first, in mm; `radius`, in m, is that of the success counted.
     """
-    environment, root_seed = cell.protocol.environment, cell.root_seed
-    rows = evaluate(act, [0], mode=mode, episodes=episodes, radius=radius, environment=environment, root_seed=root_seed)
-    first = evaluation_episode(act, 0, mode=mode, radius=radius, environment=environment, root_seed=root_seed)
+    rows, first = evaluate(act, [0], conditions), evaluation_episode(act, 0, conditions)
     path = controllers.tip_position(first.positions[:, :2])
     return {
-        "episodes": episodes,
-        "radius": radius,
+        "episodes": conditions.episodes,
+        "radius": conditions.success_radius,
         "touched": float(rows["success"].mean()),
         "ended": float(rows["final_success"].mean()),
         "target": np.round(1000 * first.positions[0, 2:], 1).tolist(),

@@ -5,7 +5,7 @@ The episode is taken from `evaluate` itself, so what is shown is an episode that
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import imageio_ffmpeg  # type: ignore[import-untyped]
@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from reacher_shaping.evaluation.evaluate import Actor, Mode, evaluate
+from reacher_shaping.evaluation.evaluate import Actor, Conditions, evaluate
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.settings.cell import Environment
 from reacher_shaping.storage.files import replacing
 from reacher_shaping.tasks.base import Lanes, load_task
 from reacher_shaping.tasks.rendering import Pixels, drawn, find_opengl, rendered, view_of
@@ -44,7 +43,7 @@ class Episode:
         goal: [3] m.
         distances: [T + 1] to the goal in m.
         episode_return: sum of the environment's own reward.
-        radius: m; success is a distance of at most `radius` after any step.
+        success_radius: m; success is a distance of at most this after any step.
         step_seconds: simulated seconds from a position to the next.
     """
 
@@ -53,17 +52,16 @@ class Episode:
     goal: NDArray[np.float64]
     distances: NDArray[np.float64]
     episode_return: float
-    radius: float
+    success_radius: float
     step_seconds: float
 
 
-def evaluation_episode(
-    act: Actor, seed: int, *, mode: Mode, radius: float, environment: Environment, root_seed: int
-) -> Episode:
-    """Return the first evaluation episode of a policy; `act` is an actor of S = 1, `seed` its name.
+def evaluation_episode(act: Actor, seed: int, conditions: Conditions) -> Episode:
+    """Return the first of the episodes that a policy is evaluated on; `act` is an actor of S = 1, `seed` its name.
 
     Raises ValueError for a task of which there are no pictures.
     """
+    environment = conditions.environment
     task, view = load_task(environment.task), view_of(environment.task)
     actions: list[NDArray[np.floating]] = []
 
@@ -73,17 +71,9 @@ def evaluation_episode(
         actions.append(action[0, :1].clip(-limit, limit))
         return action
 
-    row = evaluate(
-        watched,
-        [seed],
-        mode=mode,
-        episodes=1,
-        radius=radius,
-        environment=environment,
-        root_seed=root_seed,
-    ).iloc[0]
+    row = evaluate(watched, [seed], replace(conditions, episodes=1)).iloc[0]
     # An actor sees observations alone, so the whole state takes stepping the episode again.
-    draw = task.draw_reset(stream(root_seed, Purpose.EVALUATION_RESETS))
+    draw = task.draw_reset(stream(conditions.root_seed, Purpose.EVALUATION_RESETS))
     lanes = Lanes(task, 1)
     lanes.reset([draw])
     moving, distances = [lanes.data.qpos[0].copy()], [lanes.distance[0]]
@@ -97,7 +87,7 @@ def evaluation_episode(
         goal=view.goal(draw),
         distances=np.array(distances),
         episode_return=float(row["episode_return"]),
-        radius=radius,
+        success_radius=conditions.success_radius,
         step_seconds=task.step_seconds,
     )
 
@@ -111,9 +101,9 @@ def frames(episode: Episode, title: str) -> list[Image.Image]:
     if not opengl and episode.task != "reacher":
         raise ValueError(f"pictures of the task {episode.task} take OpenGL, and none is found here; see the README")
     with (
-        rendered(opengl, SIZE, episode.task, episode.goal, episode.radius)
+        rendered(opengl, SIZE, episode.task, episode.goal, episode.success_radius)
         if opengl
-        else nullcontext(drawn(SIZE, episode.radius))
+        else nullcontext(drawn(SIZE, episode.success_radius))
     ) as picture:
         words = [title, f"return {episode.episode_return:.1f}" + ("" if opengl else f"; {_NO_OPENGL}")]
         font = _fitting_font(words)
@@ -122,7 +112,7 @@ def frames(episode: Episode, title: str) -> list[Image.Image]:
             for step, distance in enumerate(episode.distances)
         ]
         return [
-            _captioned(picture(position), [*words, now], font, reached=step > 0 and distance <= episode.radius)
+            _captioned(picture(position), [*words, now], font, reached=step > 0 and distance <= episode.success_radius)
             for step, (position, (now, distance)) in enumerate(zip(episode.positions, told, strict=True))
         ]
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from reacher_shaping.evaluation.evaluate import Actor, Mode
+from reacher_shaping.evaluation.evaluate import Actor, Conditions
 from reacher_shaping.random_streams import Purpose, stream
-from reacher_shaping.settings.cell import Environment
 from reacher_shaping.tasks.base import load_task
 
 
@@ -32,7 +31,7 @@ def require_display() -> None:
             raise NoDisplayError(f"no display: {where} cannot be opened; record a file instead (--record FILE.gif)")
 
 
-def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, root_seed: int) -> float:
+def play(act: Actor, conditions: Conditions) -> float:
     """Show episodes on the study's evaluation resets, until the last or until the window is closed.
 
     `act` is an actor of S = 1. Returns the mean return of the episodes shown to their end, NaN if there are none.
@@ -41,6 +40,8 @@ def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, roo
     require_display()
     import gymnasium  # not above: the other commands do without it
 
+    environment, root_seed = conditions.environment, conditions.root_seed
+    stochastic = conditions.mode == "stochastic"
     task, weight = load_task(environment.task), environment.control_weight
     try:
         shown = gymnasium.make(task.gymnasium_id, render_mode="human", reward_control_weight=weight)
@@ -50,13 +51,13 @@ def play(act: Actor, *, episodes: int, mode: Mode, environment: Environment, roo
     resets, noise = stream(root_seed, Purpose.EVALUATION_RESETS), stream(root_seed, Purpose.EVALUATION_ACTIONS)
     returns: list[float] = []
     try:
-        while len(returns) < episodes and not _closed(arm):
+        while len(returns) < conditions.episodes and not _closed(arm):
             shown.reset(seed=0)
             arm.set_state(*np.split(task.draw_reset(resets), 2))
             observation, total = arm._get_obs(), 0.0
             draws = noise.standard_normal((task.episode_steps, task.action_size), dtype=np.float32)
             for draw in draws:
-                action = act(observation[None, None], draw[None, None] if mode == "stochastic" else None)[0, 0]
+                action = act(observation[None, None], draw[None, None] if stochastic else None)[0, 0]
                 observation, reward, *_ = shown.step(
                     action.clip(-task.action_limit, task.action_limit) if environment.clip_actions else action
                 )

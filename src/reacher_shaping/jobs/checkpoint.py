@@ -15,7 +15,7 @@ from reacher_shaping.storage.files import ArtifactError, read_sealed, write_seal
 from reacher_shaping.storage.policy_format import load_tensors
 from reacher_shaping.training.network import Shape
 from reacher_shaping.training.ppo import Adam
-from reacher_shaping.training.rollout import Plan
+from reacher_shaping.training.rollout import RolloutLayout
 from reacher_shaping.training.train import TrainState
 
 
@@ -29,11 +29,11 @@ def save_checkpoint(path: Path, state: TrainState, seconds: tuple[float, float] 
         "seeds": list(state.seeds),
         "shape": list(state.shape),
         "iteration": state.iteration,
-        "rows": state.rows,
+        "parameters": state.parameters,
         "adam": {"first": state.adam.first, "second": state.adam.second, "steps": state.adam.steps},
         "progress": {name: torch.from_numpy(values) for name, values in state.progress.items()},
         "episode_returns": torch.from_numpy(state.episode_returns),
-        "plan": [state.plan.steps, state.plan.episode_steps],
+        "layout": [state.layout.steps, state.layout.episode_steps],
         "shaping": {name: torch.from_numpy(values) for name, values in state.shaping.items()},
         "unlogged": torch.from_numpy(state.unlogged),
         "seconds": list(seconds),
@@ -56,12 +56,12 @@ def load_checkpoint(path: Path) -> tuple[TrainState, tuple[float, float]]:
         state = TrainState(
             seeds=tuple(content["seeds"]),
             shape=Shape(*content["shape"]),
-            rows=content["rows"],
+            parameters=content["parameters"],
             adam=Adam(**content["adam"]),
             iteration=content["iteration"],
             progress={name: values.numpy() for name, values in content["progress"].items()},
             episode_returns=content["episode_returns"].numpy(),
-            plan=Plan(*content["plan"]),
+            layout=RolloutLayout(*content["layout"]),
             shaping={name: values.numpy() for name, values in content["shaping"].items()},
             unlogged=content["unlogged"].numpy(),
         )

@@ -6,6 +6,7 @@ by this project's own lanes, on the resets that every other policy meets.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -13,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from reacher_shaping.evaluation.evaluate import Actor, evaluate
+from reacher_shaping.evaluation.evaluate import Actor, Conditions, Mode, evaluate
 from reacher_shaping.evaluation.metrics import evaluation_metrics
 from reacher_shaping.jobs.progress import Meter
 from reacher_shaping.settings.cell import Protocol
@@ -21,7 +22,7 @@ from reacher_shaping.settings.parts import Evaluation
 from reacher_shaping.tasks.base import load_task
 
 Report = Callable[[str], None]
-MODES = ("stochastic", "deterministic")
+MODES: tuple[Mode, ...] = ("stochastic", "deterministic")
 STEPS_PER_LOOK = 1000
 """Environment steps between two looks at the clock, which decides whether there is something to report."""
 
@@ -90,17 +91,15 @@ def peer_run(
 ) -> pd.DataFrame:
     """Train and evaluate one peer; one row: algorithm, seed, budget, and the columns of `runs.parquet`'s evaluation."""
     model = train(algorithm, seed, budget, protocol, report)
+    conditions = Conditions(
+        environment=protocol.environment.model_copy(update={"clip_actions": False}),  # the peers clip themselves
+        root_seed=root_seed,
+        success_radius=evaluation.radius,
+        episodes=evaluation.episodes,
+    )
     row: dict[str, Any] = {"algorithm": algorithm, "seed": seed, "budget": budget}
     for mode, prefix in zip(MODES, ("", "deterministic_"), strict=True):
-        episodes = evaluate(
-            actor(model, mode),
-            [seed],
-            mode="stochastic" if mode == "stochastic" else "deterministic",
-            episodes=evaluation.episodes,
-            radius=evaluation.radius,
-            environment=protocol.environment.model_copy(update={"clip_actions": False}),  # the peers clip themselves
-            root_seed=root_seed,
-        )
+        episodes = evaluate(actor(model, mode), [seed], replace(conditions, mode=mode))
         measured = evaluation_metrics(episodes, mode).drop(columns="episodes").iloc[0]
         row |= {f"{prefix}{name}": value for name, value in measured.items()}
     return pd.DataFrame([row])

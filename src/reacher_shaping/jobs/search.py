@@ -11,7 +11,7 @@ from typing import Any
 import optuna
 import pandas as pd
 
-from reacher_shaping.evaluation.evaluate import evaluate
+from reacher_shaping.evaluation.evaluate import Conditions, evaluate
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.search import Search
 from reacher_shaping.training.train import train
@@ -40,20 +40,13 @@ def _distribution(space: Mapping[str, Any]) -> optuna.distributions.BaseDistribu
     return (kind if whole else optuna.distributions.FloatDistribution)(space["low"], space["high"], log=space["log"])
 
 
-def score(cell: Cell, seeds: int, *, episodes: int, radius: float) -> dict[str, float]:
+def score(cell: Cell, seeds: int, *, episodes: int, success_radius: float) -> dict[str, float]:
     """Train `seeds` runs of a cell and return the means of `MEASURES` over them, actions sampled."""
     names = list(range(seeds))
-    for state in train(cell, names, radius=radius):
+    for state in train(cell, names, success_radius=success_radius):
         trained = state
-    rows = evaluate(
-        trained.policy().act,
-        names,
-        mode="stochastic",
-        episodes=episodes,
-        radius=radius,
-        environment=cell.protocol.environment,
-        root_seed=cell.root_seed,
-    )
+    conditions = Conditions(cell.protocol.environment, cell.root_seed, success_radius, episodes)
+    rows = evaluate(trained.policy().act, names, conditions)
     return {name: float(rows[column].mean()) for name, column in MEASURES.items()}
 
 

@@ -25,7 +25,7 @@ def trained_block(
     cell: Cell,
     seeds: Sequence[int],
     *,
-    radius: float,
+    success_radius: float,
     folder: Path,
     report: Callable[[str], None],
     record: Record | None = None,
@@ -56,7 +56,7 @@ def trained_block(
                 report("takes over the training that a job before has finished")
         meter = Meter(cell.iterations, len(seeds) * cell.protocol.ppo.rollout_steps, start)
         saved = time.monotonic()
-        for current in train(cell, seeds, radius=radius, state=state):
+        for current in train(cell, seeds, success_radius=success_radius, state=state):
             state = current
             for line in meter.lines(state.iteration):
                 report(line)

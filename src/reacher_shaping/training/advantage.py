@@ -6,22 +6,22 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def next_values(values: Array, ends: NDArray[np.bool_], episode_end: str) -> Array:
+def next_values(values: Array, episode_ends: NDArray[np.bool_], episode_end: str) -> Array:
     """Return the value of the state after each step, [S, L, T], from values [S, L, T+1].
 
-    The one place that says what happens at a lane's last step (`ends` [L, T]). Reacher-v5 never
+    The one place that says what happens at a lane's last step (`episode_ends` [L, T]). Reacher-v5 never
     terminates: an episode is truncated, or cut by the end of the rollout. "bootstrap" keeps the value
     of the state reached (Pardo et al. 2018); "terminal" takes it as 0, as the released code does.
     """
     following = values[..., 1:]
-    return following if episode_end == "bootstrap" else np.where(ends, 0.0, following)
+    return following if episode_end == "bootstrap" else np.where(episode_ends, 0.0, following)
 
 
 def gae(
     rewards: Array,
     values: Array,
     following: Array,
-    ends: NDArray[np.bool_],
+    episode_ends: NDArray[np.bool_],
     *,
     discount: float,
     gae_lambda: float,
@@ -32,7 +32,7 @@ def gae(
         rewards: [S, L, T].
         values: [S, L, T], V(s_t).
         following: [S, L, T], value of the state after each step (see `next_values`).
-        ends: [L, T] true at a lane's last step; nothing after it reaches back.
+        episode_ends: [L, T] true at a lane's last step; nothing after it reaches back.
         discount: gamma.
         gae_lambda: lambda.
     """
@@ -40,7 +40,7 @@ def gae(
     advantages = np.empty_like(deltas)
     carry = np.zeros(deltas.shape[:-1])
     for t in reversed(range(deltas.shape[-1])):
-        carry = deltas[..., t] + np.where(ends[:, t], 0.0, discount * gae_lambda * carry)
+        carry = deltas[..., t] + np.where(episode_ends[:, t], 0.0, discount * gae_lambda * carry)
         advantages[..., t] = carry
     return advantages
 

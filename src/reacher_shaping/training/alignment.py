@@ -7,7 +7,7 @@ from reacher_shaping.settings.cell import PPO
 from reacher_shaping.training import ppo
 from reacher_shaping.training.advantage import gae
 from reacher_shaping.training.policy import Policy
-from reacher_shaping.training.rollout import Plan
+from reacher_shaping.training.rollout import RolloutLayout
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ def alignment(
     log_prob: NDArray[np.float32],
     reward: Array,
     shaping: Array,
-    plan: Plan,
+    layout: RolloutLayout,
     settings: PPO,
 ) -> Array:
     """Return the cosine [S] of the gradients of the unshaped return and of the shaping (Du et al. 2018, eq. 3).
@@ -35,19 +35,19 @@ def alignment(
         log_prob: [S, L, T].
         reward: [S, L, T] unshaped.
         shaping: [S, L, T], the terms added to it; their scale does not count.
-        plan: how the rollout lies in lanes.
+        layout: how the rollout lies in lanes.
         settings: discount and lambda.
     """
     plain = settings.model_copy(update={"value_coefficient": 0.0, "entropy_coefficient": 0.0, "ratio_pairs": "sample"})
-    learner = ppo.Learner(policy.rows, plain, policy.shape)
+    learner = ppo.Learner(policy.parameters, plain, policy.shape)
     gradients = []
     for rewards, gae_lambda in ((reward, 1.0), (shaping, settings.gae_lambda)):
         zeros = np.zeros_like(rewards)
-        to_come = gae(rewards, zeros, zeros, plan.ends, discount=settings.discount, gae_lambda=gae_lambda)
-        to_come -= to_come[:, : max(plan.episodes, 1)].mean(1, keepdims=True)
-        wanted = plan.sequence(to_come)
+        to_come = gae(rewards, zeros, zeros, layout.episode_ends, discount=settings.discount, gae_lambda=gae_lambda)
+        to_come -= to_come[:, : max(layout.episodes, 1)].mean(1, keepdims=True)
+        wanted = layout.sequence(to_come)
         records = ppo.pack(
-            plan.sequence(features), plan.sequence(action), plan.sequence(log_prob), wanted, np.zeros_like(wanted)
+            layout.sequence(features), layout.sequence(action), layout.sequence(log_prob), wanted, np.zeros_like(wanted)
         )
         learner.differentiate(ppo.unpack(records, policy.shape.actions))
         gradients.append(learner.gradient.numpy().astype(np.float64))

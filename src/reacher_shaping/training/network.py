@@ -85,9 +85,9 @@ def parameter_count(shape: Shape) -> int:
     return shape.towers * math.ceil(used / ALIGNMENT) * ALIGNMENT
 
 
-def layers(rows: View, shape: Shape) -> Layers[View]:
-    """Return the layers as views of `rows` [S, P]."""
-    stack = rows.reshape(len(rows) * shape.towers, -1)
+def layers(parameters: View, shape: Shape) -> Layers[View]:
+    """Return the layers as views of `parameters` [S, P]."""
+    stack = parameters.reshape(len(parameters) * shape.towers, -1)
     views, start = [], 0
     for sizes in _shapes(shape):
         size = math.prod(sizes)
@@ -111,9 +111,9 @@ class Passes:
         layers: the parameters.
     """
 
-    def __init__(self, rows: Tensor, shape: Shape) -> None:
+    def __init__(self, parameters: Tensor, shape: Shape) -> None:
         """Read parameters [S, P] of networks of `shape`, now and whenever they change."""
-        self.layers = layers(rows.numpy(), shape)
+        self.layers = layers(parameters.numpy(), shape)
         self._owned = owned(shape).astype(self.layers.head.dtype)
         self._features: Array = np.empty((0, 0, 0))
         self._reserve(0)

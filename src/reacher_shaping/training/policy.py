@@ -25,8 +25,8 @@ def initialise(seeds: Sequence[int], root_seed: int, settings: PPO, shape: Shape
     (Andrychowicz et al. 2021; Stable-Baselines3).
     """
     towers = shape.towers
-    rows = torch.zeros(len(seeds), parameter_count(shape))
-    network = layers(rows, shape)
+    parameters = torch.zeros(len(seeds), parameter_count(shape))
+    network = layers(parameters, shape)
     draw = _draw_orthogonal if settings.initialisation == "orthogonal" else _draw_default
     for row, seed in enumerate(seeds):
         generator = stream(root_seed, Purpose.INITIALISATION, seed)
@@ -35,7 +35,7 @@ def initialise(seeds: Sequence[int], root_seed: int, settings: PPO, shape: Shape
     for part in (network.head, network.head_bias):
         part.view(len(seeds), towers, *part.shape[1:]).mul_(torch.from_numpy(owned(shape)))
     network.log_std.fill_(settings.initial_log_std)
-    return rows
+    return parameters
 
 
 def _draw_default(tower: Layers[Tensor], generator: np.random.Generator) -> None:
@@ -74,24 +74,24 @@ class Policy:
     """S trained actor-critics, for acting and for storing.
 
     Attributes:
-        rows: [S, P] parameters.
+        parameters: [S, P] parameters.
         shape: sizes of a network.
     """
 
-    def __init__(self, rows: Tensor, shape: Shape) -> None:
+    def __init__(self, parameters: Tensor, shape: Shape) -> None:
         """Wrap parameters [S, P] of networks of `shape`."""
-        self.rows = rows
+        self.parameters = parameters
         self.shape = shape
-        self.layers = layers(rows, shape)
+        self.layers = layers(parameters, shape)
         self._acting = self.passes()
 
     def __len__(self) -> int:
         """Return S."""
-        return self.rows.shape[0]
+        return self.parameters.shape[0]
 
     def passes(self) -> Passes:
         """Return new passes through these networks, with buffers of their own."""
-        return Passes(self.rows, self.shape)
+        return Passes(self.parameters, self.shape)
 
     @silent
     def act(self, observation: NDArray[np.float64], noise: NDArray[np.float32] | None) -> NDArray[np.float32]:
@@ -108,7 +108,7 @@ class Policy:
 
     def only(self, row: int) -> "Policy":
         """Return the policy of one row."""
-        return Policy(self.rows[row : row + 1], self.shape)
+        return Policy(self.parameters[row : row + 1], self.shape)
 
     def weights(self) -> dict[str, Tensor]:
         """Return the stacked weights under the names of the released code's state dict, [S, ...].

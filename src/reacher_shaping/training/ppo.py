@@ -81,16 +81,16 @@ class Adam:
     steps: int = 0
 
     @classmethod
-    def zeros_like(cls, rows: Tensor) -> "Adam":
+    def zeros_like(cls, parameters: Tensor) -> "Adam":
         """Return the state before the first step for parameters [S, P]."""
-        return cls(torch.zeros_like(rows), torch.zeros_like(rows))
+        return cls(torch.zeros_like(parameters), torch.zeros_like(parameters))
 
-    def step(self, rows: Tensor, gradient: Tensor, learning_rate: float, epsilon: float) -> None:
-        """Change `rows` [S, P] in place, by the kernel that torch.optim.Adam(fused=True) calls."""
+    def step(self, parameters: Tensor, gradient: Tensor, learning_rate: float, epsilon: float) -> None:
+        """Change `parameters` [S, P] in place, by the kernel that torch.optim.Adam(fused=True) calls."""
         self.steps += 1
         beta1, beta2 = BETAS
         torch._fused_adam_(
-            [rows], [gradient], [self.first], [self.second], [], [torch.tensor(float(self.steps))],
+            [parameters], [gradient], [self.first], [self.second], [], [torch.tensor(float(self.steps))],
             lr=learning_rate, beta1=beta1, beta2=beta2, weight_decay=0.0, eps=epsilon, amsgrad=False, maximize=False,
         )  # fmt: skip
 
@@ -99,18 +99,18 @@ class Learner:
     """The parameters, Adam's state, and the buffers of the gradient, allocated once.
 
     Attributes:
-        rows: [S, P] parameters, changed in place.
+        parameters: [S, P] parameters, changed in place.
         gradient: [S, P] of the last minibatch.
         adam: Adam's state.
     """
 
-    def __init__(self, rows: Tensor, settings: PPO, shape: Shape, adam: Adam | None = None) -> None:
+    def __init__(self, parameters: Tensor, settings: PPO, shape: Shape, adam: Adam | None = None) -> None:
         """Take over parameters [S, P] of networks of `shape`; `adam` continues an earlier run."""
-        self.rows = rows
+        self.parameters = parameters
         self.settings = settings
-        self.adam = adam or Adam.zeros_like(rows)
-        self.passes = Passes(rows, shape)
-        self.gradient = torch.zeros_like(rows)
+        self.adam = adam or Adam.zeros_like(parameters)
+        self.passes = Passes(parameters, shape)
+        self.gradient = torch.zeros_like(parameters)
         self._gradients = layers(self.gradient.numpy(), shape)
 
     @silent
@@ -133,7 +133,7 @@ class Learner:
             for minibatch in zip(*samples, strict=True):
                 self.differentiate(Samples(*minibatch))
                 self._clip()
-                self.adam.step(self.rows, self.gradient, learning_rate, self.settings.adam_epsilon)
+                self.adam.step(self.parameters, self.gradient, learning_rate, self.settings.adam_epsilon)
 
     def differentiate(self, samples: Samples) -> None:
         """Write dL/dparameters of one minibatch [S, B] into `gradient`."""

@@ -23,7 +23,7 @@ Stack = TypeVar("Stack", NDArray[Any], Tensor)
 
 
 @dataclass(frozen=True)
-class Plan:
+class RolloutLayout:
     """How the `steps` of a rollout are laid out in lanes of T = `episode_steps`; only the last may be shorter."""
 
     steps: int
@@ -46,7 +46,7 @@ class Plan:
         return self.steps // self.episode_steps
 
     @cached_property
-    def ends(self) -> NDArray[np.bool_]:
+    def episode_ends(self) -> NDArray[np.bool_]:
         """[L, T] true at each lane's last step."""
         return np.equal(np.arange(self.episode_steps), self.lengths[:, None] - 1)
 
@@ -62,7 +62,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Rollout:
-    """What one rollout recorded; where the plan takes no step the numbers are to be ignored.
+    """What one rollout recorded; where the layout takes no step the numbers are to be ignored.
 
     Attributes:
         observation: [S, L, T+1, F], s_0 .. s_T.
@@ -86,19 +86,19 @@ class Collector:
     """Collects rollouts for S seeds; holds the lanes and the streams' keys."""
 
     def __init__(
-        self, task: Task, seeds: Sequence[int], root_seed: int, plan: Plan, *, clip_actions: bool = False
+        self, task: Task, seeds: Sequence[int], root_seed: int, layout: RolloutLayout, *, clip_actions: bool = False
     ) -> None:
         """Allocate S x L lanes."""
         self.task = task
         self.seeds = list(seeds)
         self.root_seed = root_seed
-        self.plan = plan
+        self.layout = layout
         self.clip_actions = clip_actions
-        self.lanes = Lanes(task, len(self.seeds) * plan.lanes)
+        self.lanes = Lanes(task, len(self.seeds) * layout.lanes)
 
     def collect(self, policy: Policy, iteration: int) -> Rollout:
         """Run one rollout of `iteration` (counted from 0) with `policy` fixed."""
-        task, shape, times = self.task, (len(self.seeds), self.plan.lanes), self.plan.episode_steps
+        task, shape, times = self.task, (len(self.seeds), self.layout.lanes), self.layout.episode_steps
         observation = np.empty((*shape, times + 1, task.observation_size))
         measured = np.empty((*shape, times + 1, len(task.measures)))
         action = np.empty((*shape, times, task.action_size), dtype=np.float32)
@@ -117,13 +117,13 @@ class Collector:
     def resets(self, iteration: int) -> list[Array]:
         """Return the reset of each lane [D], seed by seed."""
         generators = [stream(self.root_seed, Purpose.RESETS, seed, iteration) for seed in self.seeds]
-        return [self.task.draw_reset(generator) for generator in generators for _ in range(self.plan.lanes)]
+        return [self.task.draw_reset(generator) for generator in generators for _ in range(self.layout.lanes)]
 
     def _applied(self, action: NDArray[np.float32]) -> NDArray[np.float32]:
         limit = self.task.action_limit
         return action.clip(-limit, limit) if self.clip_actions else action
 
     def _noise(self, iteration: int) -> NDArray[np.float32]:
-        shape = (self.plan.lanes, self.plan.episode_steps, self.task.action_size)
+        shape = (self.layout.lanes, self.layout.episode_steps, self.task.action_size)
         generators = [stream(self.root_seed, Purpose.ACTIONS, seed, iteration) for seed in self.seeds]
         return np.stack([generator.standard_normal(shape, dtype=np.float32) for generator in generators])

@@ -92,19 +92,21 @@ class Rule:
         """Return 1 - l of an iteration; the settings refuse a schedule with a state, which has one for each seed."""
         return self.settings.mixing * float(self.alpha(state, env_steps)) / self.alpha0
 
-    def reward(self, distance: Array, env_steps: NDArray[np.int64], ends: NDArray[np.bool_], state: State) -> Array:
+    def reward(
+        self, distance: Array, env_steps: NDArray[np.int64], episode_ends: NDArray[np.bool_], state: State
+    ) -> Array:
         """Return the shaping term F [S, L, T] of every step of a rollout.
 
         Args:
             distance: [S, L, T+1] m, to the goal in s_0 .. s_T.
             env_steps: [L, T] environment steps of training done before each step: t of alpha(t).
-            ends: [L, T] true at a lane's last step, where the episode (or the rollout) is cut.
+            episode_ends: [L, T] true at a lane's last step, where the episode (or the rollout) is cut.
             state: of schedule and potential.
         """
         phi = self.potential.value(state, np.asarray(distance, dtype=np.float64))
         before, after = phi[..., :-1], phi[..., 1:]
         if self.settings.terminal_potential == "zero" and self.settings.episode_end == "terminal":
-            after = np.where(ends, 0.0, after)
+            after = np.where(episode_ends, 0.0, after)
         if self.settings.form == "hurl":
             return self._mixing(state, int(env_steps.flat[0])) * self.discount * self.alpha0 * after
         weight = self.alpha(state, env_steps)

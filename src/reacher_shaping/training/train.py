@@ -23,11 +23,11 @@ from reacher_shaping.training.alignment import alignment
 from reacher_shaping.training.network import Shape, silent
 from reacher_shaping.training.policy import Policy, initialise, inputs
 from reacher_shaping.training.records import State, Transitions
-from reacher_shaping.training.rollout import Collector, Plan, Rollout
+from reacher_shaping.training.rollout import Collector, Rollout, RolloutLayout
 from reacher_shaping.training.shaping import Rule
 
 Array = NDArray[np.float64]
-Rows = dict[str, NDArray[Any]]
+Columns = dict[str, NDArray[Any]]
 RELEASED_LOG_EPISODES = 10
 """Episodes of a rollout, the last ones, that the released code's logged return is the mean of."""
 
@@ -42,11 +42,11 @@ class TrainState:
     Attributes:
         seeds: run seeds of the block.
         shape: sizes of a network.
-        rows: [S, P] parameters.
+        parameters: [S, P] parameters.
         adam: Adam's state.
         progress: [S, I] of each of `MEASURES`, NaN from `iteration` on.
         episode_returns: [S, I, E] unshaped returns of the episodes that reached the time limit.
-        plan: how an iteration's environment steps lie in episodes.
+        layout: how an iteration's environment steps lie in episodes.
         shaping: the state of the shaping's weight and potential.
         unlogged: [S] shaped return of the last rollout's steps after its last whole episode.
         iteration: iterations done.
@@ -54,11 +54,11 @@ class TrainState:
 
     seeds: tuple[int, ...]
     shape: Shape
-    rows: Tensor
+    parameters: Tensor
     adam: ppo.Adam
-    progress: Rows
+    progress: Columns
     episode_returns: Array
-    plan: Plan
+    layout: RolloutLayout
     shaping: State
     unlogged: Array
     iteration: int = 0
@@ -67,28 +67,28 @@ class TrainState:
     def start(cls, cell: Cell, seeds: Sequence[int]) -> "TrainState":
         """Return the state before the first iteration."""
         settings, task = cell.protocol.ppo, load_task(cell.protocol.environment.task)
-        shape, plan = Shape.of(task, settings), Plan(settings.rollout_steps, task.episode_steps)
-        rows = initialise(seeds, cell.root_seed, settings, shape)
+        shape, layout = Shape.of(task, settings), RolloutLayout(settings.rollout_steps, task.episode_steps)
+        parameters = initialise(seeds, cell.root_seed, settings, shape)
         logged = (len(seeds), cell.iterations)
         return cls(
             seeds=tuple(seeds),
             shape=shape,
-            rows=rows,
-            adam=ppo.Adam.zeros_like(rows),
+            parameters=parameters,
+            adam=ppo.Adam.zeros_like(parameters),
             progress={name: np.full(logged, np.nan) for name in MEASURES},
-            episode_returns=np.full((*logged, plan.episodes), np.nan),
-            plan=plan,
+            episode_returns=np.full((*logged, layout.episodes), np.nan),
+            layout=layout,
             shaping=Rule.of(cell).start(len(seeds)),
             unlogged=np.zeros(len(seeds)),
         )
 
     def policy(self) -> Policy:
         """Return the policy as trained so far."""
-        return Policy(self.rows, self.shape)
+        return Policy(self.parameters, self.shape)
 
     def diverged(self) -> list[int]:
         """Return the seeds whose parameters are no longer finite."""
-        finite = torch.isfinite(self.rows).all(dim=1).tolist()
+        finite = torch.isfinite(self.parameters).all(dim=1).tolist()
         return [seed for seed, ok in zip(self.seeds, finite, strict=True) if not ok]
 
     def progress_frame(self) -> pd.DataFrame:
@@ -98,7 +98,7 @@ class TrainState:
             {
                 "seed": np.repeat(self.seeds, self.iteration),
                 "iteration": iterations,
-                "env_steps": iterations * self.plan.steps,
+                "env_steps": iterations * self.layout.steps,
                 **{name: values[:, : self.iteration].ravel() for name, values in self.progress.items()},
             }
         )
@@ -111,25 +111,27 @@ class TrainState:
         returns = self.episode_returns[:, : self.iteration]
         seeds, iterations, episodes = returns.shape
         iteration = np.tile(np.repeat(np.arange(iterations), episodes), seeds)
-        within = np.tile(self.plan.episode_steps * np.arange(1, episodes + 1), seeds * iterations)
+        within = np.tile(self.layout.episode_steps * np.arange(1, episodes + 1), seeds * iterations)
         return pd.DataFrame(
             {
                 "seed": np.repeat(self.seeds, iterations * episodes),
                 "iteration": iteration + 1,
                 "episode_return": returns.ravel(),
-                "episode_length": self.plan.episode_steps,
-                "env_steps": iteration * self.plan.steps + within,
+                "episode_length": self.layout.episode_steps,
+                "env_steps": iteration * self.layout.steps + within,
             }
         )
 
 
-def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState | None = None) -> Iterator[TrainState]:
+def train(
+    cell: Cell, seeds: Sequence[int], *, success_radius: float, state: TrainState | None = None
+) -> Iterator[TrainState]:
     """Train the block and yield its state after every iteration (the same object, changed in place).
 
     Args:
         cell: what to train.
         seeds: run seeds of the block, in any number.
-        radius: m, tip-target distance that counts as success in the progress rows.
+        success_radius: m, tip-target distance that counts as success in the progress rows.
         state: a state to go on from; without it training starts at iteration 0.
 
     A seed whose numbers stop being finite is carried on as such and touches no other.
@@ -137,13 +139,13 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
     settings = cell.protocol.ppo
     task, rule = load_task(cell.protocol.environment.task), Rule.of(cell)
     state = state or TrainState.start(cell, seeds)
-    learner = ppo.Learner(state.rows, settings, state.shape, state.adam)
+    learner = ppo.Learner(state.parameters, settings, state.shape, state.adam)
     clip = cell.protocol.environment.clip_actions
-    collector = Collector(task, seeds, cell.root_seed, state.plan, clip_actions=clip)
+    collector = Collector(task, seeds, cell.root_seed, state.layout, clip_actions=clip)
     policy = state.policy()
     while state.iteration < cell.iterations:
         rollout = collector.collect(policy, state.iteration)
-        records, summary = prepare(cell, task, rule, state, rollout, radius)
+        records, summary = prepare(cell, task, rule, state, rollout, success_radius)
         rate = learning_rate(settings, state.iteration / cell.iterations)
         learner.update(records, _shuffles(cell, seeds, state.iteration), rate)
         losses = ppo.diagnose(policy.passes(), records, settings.clip_range)
@@ -151,7 +153,7 @@ def train(cell: Cell, seeds: Sequence[int], *, radius: float, state: TrainState 
             **summary,
             "action_std": np.exp(policy.layers.log_std.numpy()).mean((1, 2)),
             **losses._asdict(),
-            "alpha": rule.alpha(state.shaping, state.iteration * state.plan.steps),
+            "alpha": rule.alpha(state.shaping, state.iteration * state.layout.steps),
         }
         shaped, rest = measured.pop("shaped_returns"), measured.pop("rest")
         state.episode_returns[:, state.iteration] = measured.pop("episode_returns")
@@ -194,7 +196,7 @@ def released_log(shaped: Array, unlogged: Array) -> Array:
 
 
 def prepare(
-    cell: Cell, task: Task, rule: Rule, state: TrainState, rollout: Rollout, radius: float
+    cell: Cell, task: Task, rule: Rule, state: TrainState, rollout: Rollout, success_radius: float
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
     """Turn a rollout into sample records [S, N, F + A + 4] and the rollout's summary, [S] each.
 
@@ -202,39 +204,44 @@ def prepare(
     [S, E], unshaped, `shaped_returns` [S, E], and `rest` [S], the shaped return of the steps after the last
     whole episode; `alignment` [S] where the schedule asks for it, and `transitions` where the potential learns.
     """
-    settings, plan, environment = cell.protocol.ppo, state.plan, cell.protocol.environment
+    settings, layout, environment = cell.protocol.ppo, state.layout, cell.protocol.environment
     reward = task.rewards[environment.reward](
-        rollout.measured[..., 1:, :], rollout.control, control_weight=environment.control_weight, success_radius=radius
+        rollout.measured[..., 1:, :],
+        rollout.control,
+        control_weight=environment.control_weight,
+        success_radius=success_radius,
     )
-    extra = rule.reward(rollout.distance, plan.order + state.iteration * plan.steps, plan.ends, state.shaping)
+    extra = rule.reward(
+        rollout.distance, layout.order + state.iteration * layout.steps, layout.episode_ends, state.shaping
+    )
     features, log_prob, values = _outputs(state.policy(), rollout)
-    following = advantage.next_values(values, plan.ends, cell.protocol.shaping.episode_end)
+    following = advantage.next_values(values, layout.episode_ends, cell.protocol.shaping.episode_end)
     advantages = advantage.gae(
         reward + extra,
         values[..., :-1],
         following,
-        plan.ends,
-        discount=rule.discount_at(state.shaping, state.iteration * plan.steps),
+        layout.episode_ends,
+        discount=rule.discount_at(state.shaping, state.iteration * layout.steps),
         gae_lambda=settings.gae_lambda,
     )
-    advantages, fitted = plan.sequence(advantages), plan.sequence(values[..., :-1])
+    advantages, fitted = layout.sequence(advantages), layout.sequence(values[..., :-1])
     targets = advantages + fitted
     records = ppo.pack(
-        plan.sequence(features),
-        plan.sequence(rollout.action),
-        plan.sequence(log_prob),
+        layout.sequence(features),
+        layout.sequence(rollout.action),
+        layout.sequence(log_prob),
         advantage.normalise(advantages),
         targets,
     )
-    summary: dict[str, Any] = _summary(reward, extra, rollout, plan, radius) | {
+    summary: dict[str, Any] = _summary(reward, extra, rollout, layout, success_radius) | {
         "explained_variance": _explained(fitted, targets)
     }
     if rule.schedule.aligned:
         acted = (features, rollout.action, log_prob)
-        summary["alignment"] = alignment(state.policy(), *acted, reward, extra, plan, settings)
+        summary["alignment"] = alignment(state.policy(), *acted, reward, extra, layout, settings)
     if rule.learns:
-        before, after = plan.sequence(rollout.distance[..., :-1]), plan.sequence(rollout.distance[..., 1:])
-        summary["transitions"] = Transitions(before, after, plan.sequence(reward), settings.discount)
+        before, after = layout.sequence(rollout.distance[..., :-1]), layout.sequence(rollout.distance[..., 1:])
+        summary["transitions"] = Transitions(before, after, layout.sequence(reward), settings.discount)
     return records, summary
 
 
@@ -252,20 +259,20 @@ def _outputs(policy: Policy, rollout: Rollout) -> tuple[NDArray[np.float32], NDA
     return features[:, :, :-1], log_prob, values.astype(np.float64)
 
 
-def _summary(reward: Array, extra: Array, rollout: Rollout, plan: Plan, radius: float) -> Rows:
+def _summary(reward: Array, extra: Array, rollout: Rollout, layout: RolloutLayout, success_radius: float) -> Columns:
     """Return the means [S] over a rollout's whole episodes, their returns [S, E], and the return of the rest [S]."""
-    whole = slice(0, plan.episodes)
+    whole = slice(0, layout.episodes)
     returns = reward[:, whole].sum(-1)
-    shaped = np.where(plan.ends.cumsum(1) - plan.ends, 0.0, reward + extra).sum(-1)
+    shaped = np.where(layout.episode_ends.cumsum(1) - layout.episode_ends, 0.0, reward + extra).sum(-1)
     distance = rollout.distance[:, whole, 1:]
     return {
         "episode_returns": returns,
         "episode_return": returns.mean(1),
         "shaped_returns": shaped[:, whole],
-        "rest": shaped[:, plan.episodes :].sum(1),
+        "rest": shaped[:, layout.episodes :].sum(1),
         "shaped_return": shaped[:, whole].mean(1),
-        "episode_length": np.full(len(returns), float(plan.episode_steps)),
-        "success_rate": (distance.min(-1) <= radius).mean(1),
+        "episode_length": np.full(len(returns), float(layout.episode_steps)),
+        "success_rate": (distance.min(-1) <= success_radius).mean(1),
         "final_distance": distance[..., -1].mean(1),
     }
 
