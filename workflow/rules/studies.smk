@@ -5,7 +5,7 @@ import yaml
 
 from reacher_shaping.settings import outputs
 
-HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())}
+HYPOTHESES = or_stop(lambda: outputs.ledgers(yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())))
 FEATURES = {name: outputs.features(STUDY, name, HYPOTHESES) for name in STUDY.studies}
 FOLDERS = {outputs.folder(name): name for name in STUDY.studies}
 
