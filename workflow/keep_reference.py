@@ -62,8 +62,7 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     """Write all of the reference run into an empty folder; return its manifest."""
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
-    ledger = yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8"))
-    hypotheses = {entry["study"] for entry in ledger}
+    hypotheses = outputs.ledgers(yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8")))
     before = read_json(KEPT / "manifest.json")["experiments"] if (KEPT / "manifest.json").exists() else {}
     further, earlier = {}, {}
     for name, own in study.studies.items():

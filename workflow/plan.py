@@ -60,12 +60,8 @@ def main(given: argparse.Namespace) -> None:
     for rule, folder, reason in jobs:
         block = known.get(folder)
         reasons[rule][reason] += 1
-        if rule == "train_block" and block:
-            seconds[rule].append(cost.training_seconds(block.cell, len(block.seeds), rates))
-        elif rule in ("evaluate_block", "evaluate_long") and block:
-            seconds[rule].append(cost.evaluation_seconds(settings.evaluation, len(block.seeds), rates))
-        else:
-            seconds[rule].append(cost.SMALL_JOB_SECONDS)
+        cell, runs = (block.cell, len(block.seeds)) if block else (None, 0)
+        seconds[rule].append(cost.job_seconds(rule, cell, settings.evaluation, runs, rates))
     order = sorted(seconds, key=lambda rule: -sum(seconds[rule]))
     for rule in order[:SHOWN]:
         told = "; ".join(f"{count} x {reason}" for reason, count in reasons[rule].most_common(2))

@@ -2,15 +2,21 @@ import json
 
 import pytest
 
+from reacher_shaping.evaluation import episode_lengths
 from reacher_shaping.jobs import cost
-from reacher_shaping.settings.cell import PPO, Cell, Protocol, Variant
+from reacher_shaping.settings.cell import PPO, Cell, Environment, Protocol, Variant
 from reacher_shaping.settings.study import Evaluation
+from reacher_shaping.tasks.base import load_task
 
 RATES = cost.Rates(training=1000.0, evaluation=500.0, start=2.0)
 
 
-def cell(**ppo):
-    return Cell(protocol=Protocol(name="test", ppo=PPO(**ppo)), variant=Variant(name="l2", potential="l2"), budget=4000)
+def protocol(task="reacher", **ppo):
+    return Protocol(name="test", ppo=PPO(**ppo), environment=Environment(task=task))
+
+
+def cell(task="reacher"):
+    return Cell(protocol=protocol(task), variant=Variant(name="l2", potential="l2"), budget=4000)
 
 
 def test_training_takes_its_whole_rollouts_at_the_rate():
@@ -19,13 +25,30 @@ def test_training_takes_its_whole_rollouts_at_the_rate():
 
 
 def test_more_epochs_and_networks_are_more_work():
-    assert cost.work(PPO()) == pytest.approx(1)
-    assert cost.work(PPO(epochs=20)) == pytest.approx(0.16 + 2 * 0.84)
-    assert cost.work(PPO(networks="separate")) > cost.work(PPO())
+    assert cost.work(protocol()) == pytest.approx(1)
+    assert cost.work(protocol(epochs=20)) == pytest.approx(0.16 + 2 * 0.84)
+    assert cost.work(protocol(networks="separate")) > cost.work(protocol())
 
 
 def test_evaluation_counts_both_modes():
-    assert cost.evaluation_seconds(Evaluation(episodes=10), 3, RATES) == pytest.approx(2 + 3 * 2 * 10 * 50 / 500)
+    seconds = cost.job_seconds("evaluate_block", cell(), Evaluation(episodes=10), 3, RATES)
+    assert seconds == pytest.approx(2 + 3 * 2 * 10 * 50 / 500)
+
+
+def test_long_episodes_and_other_tasks_are_counted_as_they_are():
+    """50 episodes each of 50, 100, 200 and 500 steps; Pusher's 100 steps, of a simulation three times as slow."""
+    evaluation = Evaluation(episodes=10)
+    assert cost.LONG_STEPS == episode_lengths.EPISODES * sum(episode_lengths.LENGTHS) == 50 * 850
+    seconds = cost.job_seconds("evaluate_long", cell(), evaluation, 3, RATES)
+    assert seconds == pytest.approx(2 + 3 * 42_500 / 500)
+    assert cost.evaluation_steps(cell("pusher"), evaluation) == pytest.approx(2 * 10 * 100 * (0.55 + 0.45 * 3))
+    assert cost.work(protocol("fetch_reach")) == pytest.approx(0.16 * 36 + 0.84)
+    assert {name: load_task(name).episode_steps for name in cost.SIMULATION} == cost.EPISODE_STEPS
+
+
+def test_a_job_without_a_cell_and_one_that_runs_nothing_are_small():
+    for rule, of in (("judge_claims", None), ("render_media", cell())):
+        assert cost.job_seconds(rule, of, Evaluation(), 2, RATES) == cost.SMALL_JOB_SECONDS
 
 
 def test_rates_are_those_of_the_blocks_that_are_there(tmp_path):

@@ -1,9 +1,15 @@
 """A further study has the figures that its cells can fill."""
 
-import pytest
+from pathlib import Path
 
-from reacher_shaping.settings.outputs import MAIN_VIEWS, judged, tables_of, views
+import pytest
+import yaml
+
+from reacher_shaping.settings.base import ConfigError
+from reacher_shaping.settings.outputs import MAIN_VIEWS, judged, ledgers, tables_of, views
 from reacher_shaping.settings.study import load_study, read_settings
+
+LEDGERS = ledgers(yaml.safe_load((Path(__file__).parents[2] / "report/hypotheses.yaml").read_text()))
 
 
 def keys(*cells):
@@ -48,12 +54,12 @@ def test_the_studies_of_the_configuration_have_theirs():
 
 def test_a_study_has_the_tables_that_it_asks_for():
     study = load_study(read_settings("config.yaml"))
-    tables = {name: tables_of(study, name, {"sparse"}) for name in study.studies}
+    tables = {name: tables_of(study, name, LEDGERS) for name in study.studies}
 
     def having(table):
         return {name for name, own in tables.items() if table in own}
 
-    assert having("hypotheses") == having("takeoff") == having("targets") == {"sparse"}
+    assert having("hypotheses") == having("takeoff") == having("targets") == set(LEDGERS) == {"sparse", "weights"}
     assert "targets" not in tables_of(study, "tasks", {"tasks"}), "no targets in Reacher's plane"
     assert having("lengths") == having("long_episodes") == {"main", "long"}
     assert having("effects") == {"attribution", "ablation"}
@@ -64,9 +70,14 @@ def test_a_study_has_the_tables_that_it_asks_for():
     assert not having("peers"), "of the main study, an input only once they were asked for"
 
 
-def test_claims_are_judged_where_no_two_protocols_have_the_same_cell():
+def test_a_second_ledger_of_a_study_is_refused():
+    assert ledgers([{"study": "a"}, {"study": "b"}]).keys() == {"a", "b"}
+    with pytest.raises(ConfigError, match=r"hypotheses.yaml: study 'a' has two entries; allowed: one"):
+        ledgers([{"study": "a"}, {"study": "a"}])
+
+
+def test_claims_are_judged_where_the_papers_cells_are_and_no_two_protocols_have_the_same():
     study = load_study(read_settings("config.yaml"))
-    found = {name for name, cells in study.cells_of.items() if judged(cell.key for cell in cells)}
-    assert {"main", "released", "standard", "tuned"} <= found
-    assert not found & {"attribution", "ablation", "sparse"}
+    found = {name for name in study.studies if judged(study.design(name))}
+    assert found == {"main", "released", "standard"}
     assert {name for name in study.studies if "claims" in tables_of(study, name, {})} == found

@@ -287,6 +287,24 @@ def test_cells_are_what_their_study_declares():
     assert {cell["study"] for cell in study.design("released")} == {"released"}
 
 
+def test_seeds_and_rows_of_every_study_have_a_source():
+    study = load_study(read_settings("config.yaml"))
+    assert {"seeds", *(f"grid.{row}" for row in range(len(study.grid)))} <= study.sources.keys()
+    for name, own in study.experiments.items():
+        rows = [f"grid.{row}" for row in range(len(own.grid or ()))] or ["switches"]
+        assert {f"experiments.{name}.{part}" for part in ("seeds", *rows)} <= study.sources.keys()
+
+
+def test_every_study_has_a_toy_one():
+    toy = load_study(read_settings("config.yaml", "workflow/quick.yaml"))
+    for name, study in toy.studies.items():
+        assert max(cell.budget for cell in toy.cells_of[name]) <= 8192, name
+        assert study.seeds == 2, name
+    whole = load_study(read_settings("config.yaml"))
+    for name in ("sparse", "weights"):  # whose hypotheses name cells
+        assert len(toy.cells_of[name]) == len(whole.cells_of[name])
+
+
 def test_missing_key_is_named():
     assert "evaluation is missing" in refusal({key: value for key, value in DEFAULT.items() if key != "evaluation"})
 

@@ -379,6 +379,11 @@ def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp
         targets = read_table(folder / "targets.parquet", schemas.TARGETS)
         assert targets.groupby("protocol")["episodes"].sum().eq(2 * runs["episodes"].iloc[0]).all()
         assert set(read_table(folder / "lengths.parquet", schemas.LENGTHS)["protocol"]) == set(runs["protocol"])
+        peer = read_json(folder / "peers/ppo/seed0.json")["settings"]
+        first = read_json(copy.folder / "results/standard/none/2048/alpha1/seeds0-0/manifest.json")["settings"]["cell"]
+        assert {name: peer[name] for name in ("root_seed", "protocol")} == {
+            name: first[name] for name in ("root_seed", "protocol")
+        }
         assert copy.planned("mine") == {}
         copy.run("--allowed-rules", "build_report", "--", "report/report.html")
         page = (copy.folder / "report/report.html").read_text()

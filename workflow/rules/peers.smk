@@ -26,9 +26,7 @@ rule train_peer:
         runtime=lambda wildcards, attempt: attempt * minutes(budget_of_peer(wildcards) / 50),
     params:
         budget=budget_of_peer,
-        protocol=of_study(lambda cells, seeds: as_json(cells[0].protocol.model_dump())),
-        evaluation=as_json(STUDY.evaluation.model_dump()),
-        root_seed=STUDY.root_seed,
+        settings=lambda wildcards: as_json(settings_of_a_peer(study_of(wildcards))),
         code=of_study(lambda cells, seeds: code("train_peer", tasks_of(cells))),
     script:
         "../scripts/train_peer.py"

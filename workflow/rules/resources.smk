@@ -21,14 +21,15 @@ def minutes(seconds):
 
 def training_minutes(wildcards, attempt):
     """By the block's steps and the work of a step."""
-    ppo, seeds = CELLS[wildcards.cell].protocol.ppo, SEEDS[wildcards.block]
-    steps = CELLS[wildcards.cell].iterations * ppo.rollout_steps * len(seeds)
-    return attempt * minutes(steps * cost.work(ppo) / SLOW_STEPS_PER_SECOND)
+    cell, seeds = CELLS[wildcards.cell], SEEDS[wildcards.block]
+    steps = cell.iterations * cell.protocol.ppo.rollout_steps * len(seeds)
+    return attempt * minutes(steps * cost.work(cell.protocol) / SLOW_STEPS_PER_SECOND)
 
 
 def evaluation_minutes(wildcards, attempt):
-    """By the block's evaluation episodes, the long ones counted with them."""
-    steps = 2 * cost.MODES * STUDY.evaluation.episodes * cost.EPISODE_STEPS * len(SEEDS[wildcards.block])
+    """By the block's evaluation episodes, those of the long evaluation's added."""
+    cell, seeds = CELLS[wildcards.cell], SEEDS[wildcards.block]
+    steps = (cost.evaluation_steps(cell, STUDY.evaluation) + cost.LONG_STEPS) * len(seeds)
     return attempt * minutes(steps / SLOW_EVALUATION_STEPS_PER_SECOND)
 
 

@@ -5,7 +5,7 @@ import yaml
 
 from reacher_shaping.settings import outputs
 
-HYPOTHESES = {entry["study"]: entry for entry in yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())}
+HYPOTHESES = or_stop(lambda: outputs.ledgers(yaml.safe_load((HERE / "report/hypotheses.yaml").read_text())))
 FEATURES = {name: outputs.features(STUDY, name, HYPOTHESES) for name in STUDY.studies}
 FOLDERS = {outputs.folder(name): name for name in STUDY.studies}
 
@@ -95,10 +95,16 @@ def peers_of(study):
     return expand(path, algorithm=budgets, seed=range(settings_of_peers(study).seeds)) if budgets else []
 
 
+def settings_of_a_peer(study):
+    """What each of those runs is trained and evaluated with: as the study's first cell."""
+    cell = STUDY.cells_of[study][0]
+    evaluation = STUDY.evaluation.model_dump() | {"radius": STUDY.radius_of(cell)}
+    return {"protocol": cell.protocol.model_dump(), "evaluation": evaluation, "root_seed": cell.root_seed}
+
+
 def asked_of_peers(study):
     """What the manifests of those runs must tell, in their order."""
-    protocol = STUDY.cells_of[study][0].protocol
-    settings = {"protocol": protocol.model_dump(), "evaluation": STUDY.evaluation.model_dump()}
+    settings = settings_of_a_peer(study)
     return [
         as_json({"algorithm": algorithm, "seeds": [seed], "env_steps": budget, "settings": settings})
         for algorithm, budget in budgets_of_peers(study).items()

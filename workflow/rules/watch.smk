@@ -35,11 +35,7 @@ def is_news(record):
 def expected_seconds(name, wildcards, rates):
     """What a job takes on one core."""
     seeds = len(SEEDS.get(wildcards.get("block"), ()))
-    if name == "train_block":
-        return cost.training_seconds(CELLS[wildcards["cell"]], seeds, rates)
-    if name in ("evaluate_block", "evaluate_long"):
-        return cost.evaluation_seconds(STUDY.evaluation, seeds, rates)
-    return cost.SMALL_JOB_SECONDS
+    return cost.job_seconds(name, CELLS.get(wildcards.get("cell")), STUDY.evaluation, seeds, rates)
 
 
 def share(job):

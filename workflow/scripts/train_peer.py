@@ -14,6 +14,7 @@ from reacher_shaping.storage.files import write_json, write_table
 from reacher_shaping.storage.provenance import Record
 
 record = Record()
+settings = json.loads(snakemake.params.settings)
 params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
 
 with logged(snakemake) as say:
@@ -21,14 +22,13 @@ with logged(snakemake) as say:
         wildcards.algorithm,
         int(wildcards.seed),
         params.budget,
-        Protocol.model_validate_json(params.protocol),
-        Evaluation.model_validate_json(params.evaluation),
-        params.root_seed,
+        Protocol.model_validate(settings["protocol"]),
+        Evaluation.model_validate(settings["evaluation"]),
+        settings["root_seed"],
         say,
     )
     write_table(output.run, run, schemas.PEERS)
     path = Path(output.run)
     told = record.to_dict(path.parent, reached_files(__file__), [path], params.budget, snakemake.threads)
-    settings = {"protocol": json.loads(params.protocol), "evaluation": json.loads(params.evaluation)}
     who = {"algorithm": wildcards.algorithm, "seeds": [int(wildcards.seed)], "settings": settings}
     write_json(output.manifest, {**who, "code": params.code, **told})

@@ -9,14 +9,18 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from reacher_shaping.settings.cell import PPO, Cell
+from reacher_shaping.settings.cell import Cell, Protocol
 from reacher_shaping.settings.parts import Evaluation
 
-EPISODE_STEPS = 50
-"""Of Reacher and FetchReach; a task's record says so too, but would load the simulation. Pusher's 100 count as 50."""
+EPISODE_STEPS = {"reacher": 50, "fetch_reach": 50, "pusher": 100}
+"""Of each task; its record says so too, but would load the simulation. Of a task that is not here 50 are counted."""
+SIMULATION = {"reacher": 1.0, "fetch_reach": 36.0, "pusher": 3.0}
+"""How long a step of a task's simulation takes, that of Reacher being 1; so counts a task that is not here."""
 
 MODES = 2
 """Every run is evaluated twice, stochastic and deterministic."""
+LONG_STEPS = 42_500
+"""Steps of one run's evaluation over long episodes, 50 of each length."""
 
 SMALL_JOB_SECONDS = 10.0
 """Of a job that neither trains nor evaluates: mostly its imports."""
@@ -35,32 +39,46 @@ class Rates:
     source: str = "a guess, nothing was measured yet"
 
 
-def work(ppo: PPO) -> float:
+def work(protocol: Protocol) -> float:
     """Return the work of one environment step of training, 1 with the paper's settings.
 
     A sixth of it is the simulation, the rest the updates, which grow with epochs, networks, their width and the number
     of minibatches. Fitted to the core minutes of the reference run's studies, for estimates and nothing else.
     """
+    ppo, simulation = protocol.ppo, SIMULATION.get(protocol.environment.task, 1.0)
     trunks, width, minibatches = 0.65 + 0.35 * ppo.towers, max(1.0, ppo.hidden_units / 64), 64 / ppo.minibatch_size
-    return 0.16 + 0.84 * ppo.epochs / 10 * trunks * width * (0.5 + 0.5 * minibatches)
+    return 0.16 * simulation + 0.84 * ppo.epochs / 10 * trunks * width * (0.5 + 0.5 * minibatches)
 
 
 def training_seconds(cell: Cell, seeds: int, rates: Rates) -> float:
     """Return the seconds of one core that a block of `seeds` runs trains."""
-    ppo: PPO = cell.protocol.ppo
-    return rates.start + seeds * cell.iterations * ppo.rollout_steps * work(ppo) / rates.training
+    steps = cell.iterations * cell.protocol.ppo.rollout_steps
+    return rates.start + seeds * steps * work(cell.protocol) / rates.training
 
 
-def evaluation_seconds(evaluation: Evaluation, seeds: int, rates: Rates) -> float:
-    """Return the seconds of one core that the evaluation of `seeds` runs takes."""
-    return rates.start + seeds * MODES * evaluation.episodes * EPISODE_STEPS / rates.evaluation
+def evaluation_steps(cell: Cell, evaluation: Evaluation) -> float:
+    """Return how many of Reacher's steps one run's evaluation is worth; near half of such a step is the simulation."""
+    task = cell.protocol.environment.task
+    steps = MODES * evaluation.episodes * EPISODE_STEPS.get(task, 50)
+    return steps * (0.55 + 0.45 * SIMULATION.get(task, 1.0))
+
+
+def job_seconds(rule: str, cell: Cell | None, evaluation: Evaluation, seeds: int, rates: Rates) -> float:
+    """Return the seconds of one core that a job of a rule takes for `seeds` runs of a cell, None where it has none."""
+    if cell is None:
+        return SMALL_JOB_SECONDS
+    if rule == "train_block":
+        return training_seconds(cell, seeds, rates)
+    if rule == "evaluate_block":
+        return rates.start + seeds * evaluation_steps(cell, evaluation) / rates.evaluation
+    return rates.start + seeds * LONG_STEPS / rates.evaluation if rule == "evaluate_long" else SMALL_JOB_SECONDS
 
 
 def measured_rates(results: Path, reference: Path) -> Rates:
     """Return the rates of the blocks under `results`, else of the manifest of a reference run, else a guess."""
     found = {path.parent: _read(path) for path in results.glob("*/*/*/*/*/manifest.json")}
     records = list(found.values())
-    training = _rate((record, work(_ppo(record))) for record in records if "settings" in record)
+    training = _rate((record, work(_protocol(record))) for record in records if "settings" in record)
     evaluation = _rate((record.get("evaluation", {}), 1.0) for record in records)
     if training and evaluation:
         source = f"the {len(records)} blocks in {results}"
@@ -83,8 +101,8 @@ def _start(results: Path, records: Mapping[Path, Mapping[str, Any]]) -> float:
     return max(0.0, median(beside)) if beside else 0.0
 
 
-def _ppo(record: Mapping[str, Any]) -> PPO:
-    return Cell.model_validate_json(json.dumps(record["settings"]["cell"])).protocol.ppo
+def _protocol(record: Mapping[str, Any]) -> Protocol:
+    return Cell.model_validate_json(json.dumps(record["settings"]["cell"])).protocol
 
 
 def _rate(records: Iterable[tuple[Mapping[str, Any], float]]) -> float:

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
+from reacher_shaping.settings.base import ConfigError
 from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.study import MAIN, Study
 from reacher_shaping.storage import tables as catalogue
@@ -36,10 +37,20 @@ def shown_cells(cells: Iterable[Cell]) -> dict[str, Cell]:
     return {name: found[name] for name in SHOWN if name in found}
 
 
-def judged(keys: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether no two protocols of these cells have the same one, so that they are one study of the paper's kind."""
-    cells = [(cell["variant"], cell["budget"], cell["alpha0"]) for cell in keys]
-    return len(set(cells)) == len(cells)
+def judged(design: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether a study is one of the paper's kind: some of its cells stand in the paper, and none twice in it."""
+    cells = [(cell["variant"], cell["budget"], cell["alpha0"], cell["group"]) for cell in design]
+    return len(set(cells)) == len(cells) and any(group != "extra" for *_, group in cells)
+
+
+def ledgers(entries: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Return the entries of report/hypotheses.yaml by their study. Raises ConfigError for a second one of a study."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for entry in entries:
+        if entry["study"] in found:
+            raise ConfigError(f"report/hypotheses.yaml: study {entry['study']!r} has two entries; allowed: one")
+        found[entry["study"]] = entry
+    return found
 
 
 def folder(name: str) -> str:
@@ -56,7 +67,7 @@ def features(study: Study, name: str, hypotheses: Collection[str]) -> frozenset[
     has = {
         "main": name == MAIN,
         "further": name != MAIN,
-        "claims": name == MAIN or judged(cell.key for cell in cells),
+        "claims": name == MAIN or judged(study.design(name)),
         "switches": own.switches is not None,
         "peers": own.peers is not None,
         "lengths": own.lengths,
