@@ -129,7 +129,7 @@ def evaluate_controllers(conditions: Conditions, network: PPO | None = None) -> 
         ("untrained network", "stochastic", untrained_network(root_seed, environment.task, network or PPO())),
         ("inverse kinematics + PD", "deterministic", reach(gains)),
     ]
-    if environment.task != "reacher":
+    if task.gymnasium_id != "Reacher-v5":
         actors = actors[:-1]
     rows = []
     for name, mode, act in actors:

@@ -98,7 +98,7 @@ def frames(episode: Episode, title: str) -> list[Image.Image]:
     Raises ValueError where no OpenGL is found for a task that cannot be drawn flat, any but Reacher.
     """
     opengl, moved = find_opengl(), view_of(episode.task).moved
-    if not opengl and episode.task != "reacher":
+    if not opengl and not episode.task.startswith("reacher"):
         raise ValueError(f"pictures of the task {episode.task} take OpenGL, and none is found here; see the README")
     with (
         rendered(opengl, SIZE, episode.task, episode.goal, episode.success_radius)

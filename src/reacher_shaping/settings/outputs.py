@@ -72,7 +72,7 @@ def features(study: Study, name: str, hypotheses: Collection[str]) -> frozenset[
         "peers": own.peers is not None,
         "lengths": own.lengths,
         "hypotheses": name in hypotheses,
-        "targets": name in hypotheses and all(cell.protocol.environment.task == "reacher" for cell in cells),
+        "targets": name in hypotheses and all(cell.protocol.environment.task.startswith("reacher") for cell in cells),
     }
     return frozenset(feature for feature, there in has.items() if there)
 

@@ -44,6 +44,7 @@ PEER_PPO: dict[str, Any] = {
 }
 """What Stable-Baselines3's PPO has for the settings that are not handed over to it (`sb3_baselines.train`)."""
 MAIN = "main"
+CLOSED_FORM = "reacher_closed_form"
 RESERVED_FOLDERS = frozenset({"benchmarks", "experiments", "logs", "media", "notebooks", "peers", "search", "tables"})
 
 
@@ -115,11 +116,7 @@ class Study(Settings):
                     raise ValueError(
                         f"{where}: cell {cell.name} is there {names.count(cell.name)} times; allowed: once"
                     )
-                if cell.potential in LEARNED and cell.protocol.shaping.episode_end == "terminal":
-                    raise ValueError(
-                        f"{where}: cell {cell.name} learns a potential beyond an episode's end, where nothing counts; "
-                        f"allowed: a protocol with shaping.episode_end = 'bootstrap', unlike {cell.protocol.name}"
-                    )
+                _require_possible(where, cell)
                 if known.setdefault(cell.folder, cell) != cell:
                     raise ValueError(
                         f"{where}: cell {cell.name} is also in another study, with other settings; "
@@ -217,6 +214,21 @@ class Study(Settings):
         """
         count, size = seeds or self.seeds, self.seeds_per_block
         return tuple(range(first, min(first + size, count)) for first in range(0, count, size))
+
+
+def _require_possible(where: str, cell: Cell) -> None:
+    """Raise ValueError for settings that contradict each other, or that a table would not tell."""
+    protocol = cell.protocol
+    if cell.potential in LEARNED and protocol.shaping.episode_end == "terminal":
+        raise ValueError(
+            f"{where}: cell {cell.name} learns a potential beyond an episode's end, where nothing counts; "
+            f"allowed: a protocol with shaping.episode_end = 'bootstrap', unlike {protocol.name}"
+        )
+    if protocol.environment.task == CLOSED_FORM and "closed_form" not in protocol.name:
+        raise ValueError(
+            f"{where}: protocol {protocol.name} has the task {CLOSED_FORM}, which its tables are to tell; "
+            "allowed: a name with `closed_form` in it"
+        )
 
 
 def _place(study: str) -> str:

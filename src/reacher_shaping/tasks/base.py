@@ -32,6 +32,21 @@ class Reward(Protocol):
         """Return r [...] of what was measured after each step [..., M] and ||a||^2 of the actions applied [...]."""
 
 
+class Simulations(Protocol):
+    """N copies of one simulation side by side, as `mujoco.batch.Batch` has them; `state` [N, ...] may be written."""
+
+    state: Array
+
+    def bind(self, name: str) -> Array:
+        """Return a field of `mujoco.MjData` [N, ...] that follows the simulations; state fields may be written."""
+
+    def forward(self) -> None:
+        """Compute all positions anew from the state."""
+
+    def step(self, nstep: int) -> None:
+        """Take so many solver steps."""
+
+
 class Bounds(NamedTuple):
     """What any results of a task must keep to, whatever was learned."""
 
@@ -89,6 +104,7 @@ class Task:
         bounds: what results must keep to.
         settle: changes the state after an environment step, before all positions are computed anew; None where the
             environment leaves them as the last solver step did.
+        batch: makes N simulations that are not MuJoCo's; None where `simulated_model` is stepped.
     """
 
     gymnasium_id: str
@@ -108,6 +124,7 @@ class Task:
     rewards: Mapping[str, Reward]
     bounds: Bounds
     settle: Callable[[Data], None] | None = None
+    batch: Callable[[int], Simulations] | None = None
     action_limit: float = 1.0
 
 
@@ -134,7 +151,7 @@ class Lanes:
         profiling_clock().value = None
         self.task = task
         self.count = count
-        self.batch = Batch(task.simulated_model(), count, nthread=1)
+        self.batch: Simulations = task.batch(count) if task.batch else Batch(task.simulated_model(), count, nthread=1)
         self.data = Data(**{name: self.batch.bind(name) for name in task.fields})
         self.observation = np.empty((count, task.observation_size))
         self.measured = np.empty((count, len(task.measures)))
