@@ -72,6 +72,8 @@ def training(cell: Cell, seeds: int) -> Training:
 
 
 CONTENDERS = {
+    "closed form, 10 seeds": ("closed_form", BLOCK),
+    "closed form, 1 seed": ("closed_form", 1),
     "Stable-Baselines3": ("stable_baselines", 1),
     "Stable-Baselines3, shared trunk": ("shared_trunk", 1),
     "EnvPool + Stable-Baselines3": ("envpool", 1),
@@ -102,7 +104,7 @@ def measure_training(size: Size) -> Iterator[Measure]:
     for seeds in (size.block, 1):
         for kernels in processor.KERNELS:
             name = f"{named(seeds)}, {kernels} kernels"
-            for peer in ("Stable-Baselines3", f"JAX, {named(seeds)}"):
+            for peer in ("Stable-Baselines3", f"JAX, {named(seeds)}", f"closed form, {named(seeds)}"):
                 targets = {"must": 13 if seeds > 1 else 5, "aim": 18 if seeds > 1 else 8} if "Base" in peer else {}
                 if peer in rates:
                     yield measure(part, f"{name} / {peer}", ratios(rates[name], rates[peer]), "x", **targets)

@@ -42,6 +42,11 @@ def engine(cell: Cell) -> Work:
     return work
 
 
+def closed_form(cell: Cell) -> Work:
+    environment = cell.protocol.environment.model_copy(update={"task": "reacher_closed_form"})
+    return engine(cell.model_copy(update={"protocol": cell.protocol.model_copy(update={"environment": environment})}))
+
+
 def jax(cell: Cell) -> Work:
     import jax_ppo
 
