@@ -23,12 +23,12 @@ WHOLE = replace(TASK, simulated_model=TASK.model)
 
 
 class AutogradLearner(ppo.Learner):
-    """The stack of networks as a reader would first write it: autograd, and torch's own Adam on the rows."""
+    """The stack of networks as a reader would first write it: autograd, and torch's own Adam on the parameters."""
 
-    def __init__(self, rows, settings, shape, adam=None):
-        super().__init__(rows, settings, shape, adam)
+    def __init__(self, parameters, settings, shape, adam=None):
+        super().__init__(parameters, settings, shape, adam)
         self.shape = shape
-        self.parameter = torch.nn.Parameter(rows)
+        self.parameter = torch.nn.Parameter(parameters)
         self.optimizer = torch.optim.Adam([self.parameter], eps=settings.adam_epsilon)
 
     def update(self, records, shuffles, learning_rate):

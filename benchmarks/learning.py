@@ -40,7 +40,12 @@ def measures(policy, seeds, cell, study):
     episodes = evaluate(
         policy.act,
         seeds,
-        Conditions(cell.protocol.environment, cell.root_seed, study.evaluation.radius, study.evaluation.episodes),
+        Conditions(
+            environment=cell.protocol.environment,
+            root_seed=cell.root_seed,
+            success_radius=study.evaluation.radius,
+            episodes=study.evaluation.episodes,
+        ),
     ).groupby("seed")
     return {
         "success_rate": episodes["success"].mean().to_list(),

@@ -71,9 +71,9 @@ def training(cell: Cell, seeds: int) -> Training:
     return Training(engine(cell, range(seeds)), seeds * cell.protocol.ppo.rollout_steps)
 
 
+ENGINES = {"": "engine", " in closed form": "closed_form"}
+"""The engine as it is and with the arm in closed form: their names in worker.py."""
 CONTENDERS = {
-    "closed form, 10 seeds": ("closed_form", BLOCK),
-    "closed form, 1 seed": ("closed_form", 1),
     "Stable-Baselines3": ("stable_baselines", 1),
     "Stable-Baselines3, shared trunk": ("shared_trunk", 1),
     "EnvPool + Stable-Baselines3": ("envpool", 1),
@@ -94,7 +94,8 @@ def measure_training(size: Size) -> Iterator[Measure]:
     workers = {}
     for seeds in (size.block, 1):
         for kernels in processor.KERNELS:
-            workers[f"{named(seeds)}, {kernels} kernels"] = Worker("engine", seeds, kernels, size.quick)
+            for label, name in ENGINES.items():
+                workers[f"{named(seeds)}{label}, {kernels} kernels"] = Worker(name, seeds, kernels, size.quick)
     for label, (name, seeds) in CONTENDERS.items():
         try:
             workers[label] = Worker(name, min(seeds, size.block), "native", size.quick)
@@ -104,10 +105,12 @@ def measure_training(size: Size) -> Iterator[Measure]:
     for seeds in (size.block, 1):
         for kernels in processor.KERNELS:
             name = f"{named(seeds)}, {kernels} kernels"
-            for peer in ("Stable-Baselines3", f"JAX, {named(seeds)}", f"closed form, {named(seeds)}"):
+            for peer in ("Stable-Baselines3", f"JAX, {named(seeds)}"):
                 targets = {"must": 13 if seeds > 1 else 5, "aim": 18 if seeds > 1 else 8} if "Base" in peer else {}
                 if peer in rates:
                     yield measure(part, f"{name} / {peer}", ratios(rates[name], rates[peer]), "x", **targets)
+            closed = f"{named(seeds)} in closed form, {kernels} kernels"
+            yield measure(part, f"{closed} / MuJoCo", ratios(rates[closed], rates[name]), "x")
     for name, values in rates.items():
         yield measure(part, name, values, "steps/s")
     for name, worker in workers.items():
@@ -162,7 +165,12 @@ def measure_evaluation(size: Size) -> Iterator[Measure]:
     """Evaluation against a loop over gymnasium.make_vec with the same policy."""
     cell, block = size.cell(), size.block
     weight, network = cell.protocol.environment.control_weight, cell.protocol.ppo
-    conditions = Conditions(cell.protocol.environment, 0, RADIUS, size.chunks * LANES_PER_SEED)
+    conditions = Conditions(
+        environment=cell.protocol.environment,
+        root_seed=0,
+        success_radius=RADIUS,
+        episodes=size.chunks * LANES_PER_SEED,
+    )
     shape = Shape.of(TASK, network)
 
     def policies(seeds: int) -> Policy:

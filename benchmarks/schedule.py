@@ -44,8 +44,9 @@ def simulate(seconds: Sequence[float], cores: int, seconds_per_submission: float
 def blocks(study: Study, seeds: int, size: int, rates: cost.Rates) -> list[float]:
     """Seconds of every block of the main study, with `seeds` runs a cell in blocks of `size`."""
     sizes = [min(size, seeds - first) for first in range(0, seeds, size)]
+    jobs = ("train_block", "evaluate_block")
     return [
-        cost.training_seconds(cell, part, rates) + cost.evaluation_seconds(study.evaluation, part, rates)
+        sum(cost.job_seconds(rule, cell, study.evaluation, part, rates) for rule in jobs)
         for cell in study.cells
         for part in sizes
     ]

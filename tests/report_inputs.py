@@ -112,7 +112,9 @@ def make(folder, study, grid, seeds, **changes):
     write_policy(folder / "policies" / "untrained.pt", [0], start.weights(), {"cell": cell.settings()})
     acts = {"untrained": start.act, "controller": shown_policies.controller(cell)[0]}
     radius = study["evaluation"]["radius"]
-    conditions = Conditions(cell.protocol.environment, cell.root_seed, radius, episodes=2)
+    conditions = Conditions(
+        environment=cell.protocol.environment, root_seed=cell.root_seed, success_radius=radius, episodes=2
+    )
     shown = {name: shown_policies.measured(act, conditions) for name, act in acts.items()}
     shown["untrained"] |= {"cell": cell.name, "seed": 0, "weights": weights_checksum(start.weights())}
     shown["controller"]["gains"] = shown_policies.controller(cell)[1]

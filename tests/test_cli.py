@@ -52,7 +52,7 @@ def test_evaluate_repeats_the_studys_evaluation_of_every_run(ours, policy, capsy
     expected = evaluate(
         policy.act,
         [5, 6],
-        Conditions(Environment(control_weight=0.25), root_seed=9, success_radius=0.02, episodes=10),
+        Conditions(environment=Environment(control_weight=0.25), root_seed=9, success_radius=0.02, episodes=10),
     )
     assert list(rows.columns) == COLUMNS
     assert rows["run"].unique().tolist() == [str(ours)]

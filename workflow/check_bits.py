@@ -25,14 +25,13 @@ DECISIVE = ("mujoco", "numpy", "torch")
 def main() -> int:
     published = read_json(Path(sys.argv[1] if len(sys.argv) > 1 else "report/reference/bits.json"))
     cell = Cell.model_validate_json(json.dumps(published["settings"]["cell"]))
-    seeds, how = published["seeds"], {"success_radius": published["settings"]["radius"], "report": print}
+    seeds, success_radius = published["seeds"], published["settings"]["radius"]
     print(f"{cell.name}, seeds {seeds}, on {machine()['cpu']} with the kernels of {processor.core_type()}", flush=True)
     with (
         tempfile.TemporaryDirectory() as folder,  # nothing that an earlier training left may be taken over
-        training_job.trained_block(cell, seeds, folder=Path(folder) / "block", **how) as (
-            state,
-            _,
-        ),
+        training_job.trained_block(
+            cell, seeds, success_radius=success_radius, folder=Path(folder) / "block", report=print
+        ) as (state, _),
     ):
         found = weights_checksum(state.policy().weights())
     if found == published["weights"]:

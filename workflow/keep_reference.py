@@ -35,6 +35,7 @@ from reacher_shaping.storage.provenance import require_asked
 from reacher_shaping.storage.reference import (
     POLICIES,
     checksums,
+    copy_kept,
     keep_policies,
     keep_tables,
     manifest,
@@ -63,14 +64,16 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
     hypotheses = outputs.ledgers(yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8")))
-    before = read_json(KEPT / "manifest.json")["experiments"] if (KEPT / "manifest.json").exists() else {}
+    before = (
+        read_json(KEPT / "manifest.json") if (KEPT / "manifest.json").exists() else {"experiments": {}, "peers": []}
+    )
     further, earlier = {}, {}
     for name, own in study.studies.items():
         tables, place = outputs.tables_of(study, name, hypotheses), outputs.folder(name)
         if name != MAIN and not all((RESULTS / place / file).exists() for file in tables.values()):
-            if name in before:
-                shutil.copytree(KEPT / place, folder / place)
-                earlier[name] = before[name]
+            if name in before["experiments"]:
+                copy_kept(KEPT, folder, place)
+                earlier[name] = before["experiments"][name]
             continue
         keep_tables(RESULTS / place, folder / place, tables)
         if name != MAIN:
@@ -82,6 +85,11 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
     record = manifest(study.model_dump(mode="json"), settings_hash(study), blocks, further, peers)
     record["experiments"] |= earlier
+    if any(study.experiments[name].peers for name in earlier):
+        files = [peer["outputs"] for peer in record["peers"]]
+        record["peers"] += [peer for peer in before["peers"] if peer["outputs"] not in files]
+    if earlier:
+        print(f"Not in results/, so as they were kept: {', '.join(earlier)}", file=sys.stderr)
     record["tables"] = checksums(folder)
     write_json(folder / "manifest.json", record)
     return record

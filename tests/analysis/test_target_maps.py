@@ -21,7 +21,10 @@ def test_targets_are_those_that_evaluation_episodes_start_with():
         seen.append(observation[0, :, 4:6].copy())
         return np.zeros((1, observation.shape[1], 2))
 
-    evaluate(still, [0], Conditions(Environment(), 11, 0.02, 60, "deterministic"))
+    conditions = Conditions(
+        environment=Environment(), root_seed=11, success_radius=0.02, episodes=60, mode="deterministic"
+    )
+    evaluate(still, [0], conditions)
     met = np.concatenate([seen[0], seen[50]])  # two chunks of lanes, at their first steps
     np.testing.assert_allclose(reacher_targets(11, 60), met[:60], atol=1e-12)
 

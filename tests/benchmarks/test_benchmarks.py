@@ -13,6 +13,8 @@ import torch
 from cells import small
 from mujoco.batch import Batch
 
+from reacher_shaping.jobs.cost import Rates
+from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.tasks.base import Lanes
 from reacher_shaping.tasks.reacher import TASK
 
@@ -189,6 +191,16 @@ def test_cost_of_a_study_is_the_sum_over_its_blocks():
     episodes = 23 * 12 * 2 * 1000 * 50
     assert found.core_seconds == pytest.approx(12 * steps / 20_000 + episodes / 50_000 + 23 * 2 * 2 * 3)
     assert found.longest_job == pytest.approx(6 + 10 * (489 * 2048 / 20_000 + 100_000 / 50_000))
+
+
+def test_blocks_of_the_schedule_take_their_training_and_their_evaluation():
+    """Three runs in blocks of two and one; 500,000 steps are 245 rollouts of 2,048."""
+    from schedule import blocks
+
+    study = load_study(read_settings("config.yaml"))
+    found = blocks(study, 3, 2, Rates(training=20_000, evaluation=50_000, start=3.0))
+    assert len(found) == 2 * len(study.cells)
+    assert found[:2] == pytest.approx([6 + runs * (245 * 2048 / 20_000 + 100_000 / 50_000) for runs in (2, 1)])
 
 
 def test_jobs_start_in_order_on_the_core_that_is_free_first():

@@ -152,9 +152,9 @@ def test_longer_episodes_start_with_the_short_ones():
 
 def test_a_policy_of_nans_gives_rows_and_leaves_the_others_alone(policy):
     clean = evaluate(policy.act, [0, 1], Conditions(episodes=20, **SETTINGS))
-    rows = policy.parameters.clone()
-    rows[0] = np.nan
-    found = evaluate(Policy(rows, policy.shape).act, [0, 1], Conditions(episodes=20, **SETTINGS))
+    parameters = policy.parameters.clone()
+    parameters[0] = np.nan
+    found = evaluate(Policy(parameters, policy.shape).act, [0, 1], Conditions(episodes=20, **SETTINGS))
     second = [frame[frame["seed"] == 1] for frame in (found, clean)]
     pd.testing.assert_frame_equal(*second, check_exact=True)
     assert found[found["seed"] == 0]["episode_return"].isna().all()

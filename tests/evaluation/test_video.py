@@ -11,11 +11,13 @@ from toys import point_mass
 from reacher_shaping.evaluation import video
 from reacher_shaping.evaluation.controllers import TUNED_GAINS, reach
 from reacher_shaping.evaluation.evaluate import Conditions, evaluate
-from reacher_shaping.settings.cell import Environment
+from reacher_shaping.settings.cell import REACHERS, Environment
 from reacher_shaping.tasks import rendering
 from reacher_shaping.tasks.base import load_task
 
-CONDITIONS = Conditions(Environment(control_weight=1.0), 0, 0.02, episodes=20, mode="deterministic")
+CONDITIONS = Conditions(
+    environment=Environment(control_weight=1.0), root_seed=0, success_radius=0.02, episodes=20, mode="deterministic"
+)
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +122,9 @@ def still(task):
     return lambda observation, noise: np.zeros((*observation.shape[:2], size), dtype=np.float32)
 
 
-@pytest.mark.parametrize(("task", "positions"), [("reacher", 4), ("pusher", 11), ("fetch_reach", 15)])
+@pytest.mark.parametrize(
+    ("task", "positions"), [("reacher", 4), ("reacher_closed_form", 4), ("pusher", 11), ("fetch_reach", 15)]
+)
 def test_every_tasks_filmed_episode_is_the_first_of_its_evaluation(task, positions, monkeypatch):
     record = load_task(task)
     conditions = replace(CONDITIONS, environment=Environment(task=task, clip_actions=True))
@@ -130,7 +134,7 @@ def test_every_tasks_filmed_episode_is_the_first_of_its_evaluation(task, positio
     assert filmed.distances[-1] == row["final_distance"]
     assert filmed.distances[1:].min() == row["min_distance"]
     monkeypatch.setattr(video, "find_opengl", lambda: None)
-    if task != "reacher":
+    if task not in REACHERS:
         with pytest.raises(ValueError, match=f"pictures of the task {task} take OpenGL, and none is found"):
             video.frames(filmed, "a cell")
 

@@ -41,9 +41,23 @@ def test_long_episodes_and_other_tasks_are_counted_as_they_are():
     assert cost.LONG_STEPS == episode_lengths.EPISODES * sum(episode_lengths.LENGTHS) == 50 * 850
     seconds = cost.job_seconds("evaluate_long", cell(), evaluation, 3, RATES)
     assert seconds == pytest.approx(2 + 3 * 42_500 / 500)
-    assert cost.evaluation_steps(cell("pusher"), evaluation) == pytest.approx(2 * 10 * 100 * (0.55 + 0.45 * 3))
+    seconds = cost.job_seconds("evaluate_block", cell("pusher"), evaluation, 3, RATES)
+    assert seconds == pytest.approx(2 + 3 * 2 * 10 * 100 * (0.55 + 0.45 * 3) / 500)
     assert cost.work(protocol("fetch_reach")) == pytest.approx(0.16 * 36 + 0.84)
     assert {name: load_task(name).episode_steps for name in cost.SIMULATION} == cost.EPISODE_STEPS
+
+
+@pytest.mark.parametrize("task", ["reacher", "fetch_reach"])
+def test_rates_of_a_block_foretell_its_own_seconds(tmp_path, task):
+    of = cell(task)
+    record = {"settings": {"cell": of.settings()}, "env_steps": 3 * 4096, "wall_seconds": 40.0}
+    record["evaluation"] = {"env_steps": 3 * cost.evaluation_steps(of, Evaluation(episodes=10)), "wall_seconds": 15.0}
+    folder = tmp_path / "results/test/l2/4000/alpha1/seeds0-2"
+    folder.mkdir(parents=True)
+    (folder / "manifest.json").write_text(json.dumps(record))
+    rates = cost.measured_rates(tmp_path / "results", tmp_path / "none.json")
+    for rule, seconds in (("train_block", 40.0), ("evaluate_block", 15.0)):
+        assert cost.job_seconds(rule, of, Evaluation(episodes=10), 3, rates) == pytest.approx(rates.start + seconds)
 
 
 def test_a_job_without_a_cell_and_one_that_runs_nothing_are_small():

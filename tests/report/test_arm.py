@@ -103,7 +103,10 @@ def test_success_is_that_of_the_evaluation_within_binomial_error(page, cell, nam
     policy = shown_policies.untrained(cell, 0)
     act, gains = (policy.act, None) if name == "untrained" else shown_policies.controller(cell)
     mode = "stochastic" if name == "untrained" else "deterministic"
-    ours = evaluate(act, [0], Conditions(cell.protocol.environment, 1, radius, 1000, mode))
+    conditions = Conditions(
+        environment=cell.protocol.environment, root_seed=1, success_radius=radius, episodes=1000, mode=mode
+    )
+    ours = evaluate(act, [0], conditions)
     one = {"weights": acting(policy.weights())} if gains is None else {"gains": gains}
     found = page.evaluate("([one, radius]) => arm.rates(arm.policyOf(one), 1000, 7, true, radius)", [one, radius])
     for rate, column in ((found["touched"], "success"), (found["ended"], "final_success")):
@@ -115,7 +118,9 @@ def test_success_is_that_of_the_evaluation_within_binomial_error(page, cell, nam
 def test_shown_policy_is_what_the_summary_says(cell):
     assert isinstance(cell, Cell)
     policy = shown_policies.untrained(cell, 0)
-    conditions = Conditions(cell.protocol.environment, cell.root_seed, 0.02, 200)
+    conditions = Conditions(
+        environment=cell.protocol.environment, root_seed=cell.root_seed, success_radius=0.02, episodes=200
+    )
     told, rows = shown_policies.measured(policy.act, conditions), evaluate(policy.act, [0], conditions)
     assert told["touched"] == rows["success"].mean()
     near = np.linalg.norm(

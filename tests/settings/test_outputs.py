@@ -80,4 +80,8 @@ def test_claims_are_judged_where_the_papers_cells_are_and_no_two_protocols_have_
     study = load_study(read_settings("config.yaml"))
     found = {name for name in study.studies if judged(study.design(name))}
     assert found == {"main", "released", "standard"}
+    cell = {"variant": "l2", "budget": 1, "alpha0": 1.0}
+    assert judged([cell | {"group": "main"}, cell | {"group": "extra"}, cell | {"group": "extra"}])
+    assert not judged([cell | {"group": "main"}, cell | {"group": "appendix"}])
+    assert not judged([cell | {"group": "extra"}])
     assert {name for name in study.studies if "claims" in tables_of(study, name, {})} == found

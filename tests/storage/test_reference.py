@@ -21,7 +21,15 @@ from reacher_shaping.report.readme import headline, put_headline
 from reacher_shaping.storage import schemas
 from reacher_shaping.storage.files import ArtifactError, read_table, write_json, write_table, write_text
 from reacher_shaping.storage.policy_format import read_policy, weights_checksum, write_policy
-from reacher_shaping.storage.reference import POLICIES, checksums, keep_policies, keep_tables, objections, replaced
+from reacher_shaping.storage.reference import (
+    POLICIES,
+    checksums,
+    copy_kept,
+    keep_policies,
+    keep_tables,
+    objections,
+    replaced,
+)
 from reacher_shaping.storage.tables import TABLES, of_study
 
 ROOT = Path(__file__).parents[2]
@@ -254,12 +262,30 @@ def test_what_a_new_reference_would_lose_or_cannot_tell_is_said(tmp_path, change
     assert objections(kept_folder(tmp_path / "kept"), kept_folder(tmp_path / "new", **changes)) == [said]
 
 
-def test_a_block_that_does_not_tell_its_cell_is_said(tmp_path):
-    new = kept_folder(tmp_path / "new")
-    record = json.loads((new / "manifest.json").read_text())
-    del record["blocks"][0]["cell"]
+def test_a_study_that_stays_as_it_was_kept_is_not_judged_again(tmp_path):
+    """Its blocks tell no cell and came from other code; those made now are judged all the same."""
+    kept, new = (kept_folder(tmp_path / name) for name in ("kept", "new"))
+    earlier = {"mine": [{"code": "old", "git": {"commit": "c", "dirty": True}}]}
+    for folder in (kept, new):
+        record = json.loads((folder / "manifest.json").read_text())
+        write_json(folder / "manifest.json", record | {"experiments": earlier})
+    assert objections(kept, new) == []
+    record["experiments"] = {"mine": [record["blocks"][0] | {"code": "other"}]}
     write_json(new / "manifest.json", record)
-    assert objections(tmp_path / "none", new) == ["1 of its 2 blocks do not tell their cell"]
+    assert objections(kept, new) == ["its blocks of l2 on reacher were trained by 2 different codes"]
+
+
+def test_a_kept_study_goes_over_as_it_was_or_not_at_all(tmp_path):
+    kept = kept_folder(tmp_path / "kept", files=("experiments/mine/runs.parquet", "runs.parquet"))
+    record = json.loads((kept / "manifest.json").read_text())
+    write_json(kept / "manifest.json", record | {"tables": checksums(kept)})
+    copy_kept(kept, tmp_path / "new", "experiments/mine/")
+    assert [path.name for path in (tmp_path / "new").rglob("*.parquet")] == ["runs.parquet"]
+    write_text(kept / "experiments/mine/runs.parquet", "edited")
+    with pytest.raises(
+        ArtifactError, match=r"mine/runs\.parquet: is not the file that the reference run was kept with"
+    ):
+        copy_kept(kept, tmp_path / "again", "experiments/mine/")
 
 
 def test_folder_is_replaced_whole_or_not_at_all(tmp_path):

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+import torch
 
+from reacher_shaping.jobs.checkpoint import load_checkpoint, save_checkpoint
+from reacher_shaping.settings.cell import Cell
 from reacher_shaping.settings.study import load_study, read_settings
 from reacher_shaping.tasks import reacher, reacher_closed_form
 from reacher_shaping.tasks.base import Lanes
+from reacher_shaping.training.train import train
 
 COUNT, STEPS = 60, reacher.TASK.episode_steps
 STOP = 3.0
@@ -42,7 +46,7 @@ def test_whole_episodes_are_mujocos(kind):
     theirs, measured, ours, ours_measured, elbow = side_by_side(actions_of(kind))
     met = (np.abs(elbow) > STOP).reshape(2, STEPS + 1, COUNT).cumsum(1).reshape(elbow.shape) > 0
     free = ~met
-    assert free.sum() > COUNT
+    assert free.sum() > 4 * COUNT, "some steps of most episodes, beside the two resets"
     np.testing.assert_allclose(ours[free], theirs[free], rtol=0, atol=5e-14)
     np.testing.assert_allclose(ours_measured[free], measured[free], rtol=0, atol=5e-15)
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6)
@@ -71,16 +75,30 @@ def test_reset_and_forward_are_the_same():
     np.testing.assert_allclose(ours_measured, measured, rtol=0, atol=3e-16)
 
 
-def test_a_lane_does_not_depend_on_the_others():
+@pytest.mark.parametrize("count", [1, 2, 7, 33])
+def test_a_lane_does_not_depend_on_the_others(count):
     actions = actions_of("one way")
-    alone, among = Lanes(reacher_closed_form.TASK, 1), Lanes(reacher_closed_form.TASK, COUNT)
+    few, all_of_them = Lanes(reacher_closed_form.TASK, count), Lanes(reacher_closed_form.TASK, COUNT)
     draws = [reacher.draw_reset(np.random.default_rng(seed)) for seed in range(COUNT)]
-    alone.reset(draws[7:8])
-    among.reset(draws)
+    few.reset(draws[-count:])
+    all_of_them.reset(draws)
     for action in actions:
-        alone.step(action[7:8])
-        among.step(action)
-        np.testing.assert_array_equal(alone.observation[0], among.observation[7])
+        few.step(action[-count:])
+        all_of_them.step(action)
+        np.testing.assert_array_equal(few.observation, all_of_them.observation[-count:])
+
+
+def test_a_policy_trained_on_it_goes_on_after_a_kill_as_if_there_had_been_none(tmp_path):
+    ppo = {"rollout_steps": 192, "epochs": 1, "minibatch_size": 32}
+    protocol = {"name": "closed_form", "environment": {"task": "reacher_closed_form"}, "ppo": ppo}
+    cell = Cell.model_validate({"protocol": protocol, "variant": {"name": "l2", "potential": "l2"}, "budget": 4 * 192})
+    *_, whole = train(cell, [0, 1], success_radius=0.02)
+    half = next(train(cell, [0, 1], success_radius=0.02))
+    save_checkpoint(tmp_path / "checkpoint.pt", half, (0.0, 0.0))
+    *_, resumed = train(cell, [0, 1], success_radius=0.02, state=load_checkpoint(tmp_path / "checkpoint.pt")[0])
+    assert torch.equal(resumed.parameters, whole.parameters)
+    *_, alone = train(cell, [1], success_radius=0.02)
+    assert torch.equal(alone.parameters[0], whole.parameters[1])
 
 
 def test_what_is_made_with_it_says_so_by_its_protocols_name():
@@ -98,5 +116,5 @@ def test_what_is_made_with_it_says_so_by_its_protocols_name():
         if allowed:
             assert load_study(settings).cells_of["many"][0].protocol.name == name
         else:
-            with pytest.raises(ValueError, match="protocol fast has the task reacher_closed_form, which its tables"):
+            with pytest.raises(ValueError, match=r"protocols.fast.environment.task: .* with `closed_form` in its name"):
                 load_study(settings)

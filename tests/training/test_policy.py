@@ -80,10 +80,10 @@ def test_initial_weights_are_uniform_in_the_range_of_torch_linear_and_log_std_is
 
 
 def test_initial_weights_depend_on_seed_and_root_alone():
-    rows = fresh_policy(SEEDS, 3).rows
-    assert torch.equal(fresh_policy([5, 0], 3).parameters, rows[[2, 0]])
-    assert not torch.equal(fresh_policy([5], 4).parameters[0], rows[2])
-    assert not torch.equal(rows[0], rows[1])
+    parameters = fresh_policy(SEEDS, 3).parameters
+    assert torch.equal(fresh_policy([5, 0], 3).parameters, parameters[[2, 0]])
+    assert not torch.equal(fresh_policy([5], 4).parameters[0], parameters[2])
+    assert not torch.equal(parameters[0], parameters[1])
 
 
 @pytest.mark.parametrize("networks", ["shared", "separate"])

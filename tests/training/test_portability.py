@@ -33,7 +33,8 @@ for variant, changes in (("l2", {}), ("decay", {"networks": "separate", "initial
         policy = state.policy()
         write_policy(path / f"{variant}.pt", state.seeds, policy.weights(), {})
         state.progress_frame().to_parquet(path / f"{variant}-progress.parquet")
-        episodes = evaluate(policy.act, state.seeds, Conditions(cell.protocol.environment, 1, 0.02, episodes=10))
+        met = Conditions(environment=cell.protocol.environment, root_seed=1, success_radius=0.02, episodes=10)
+        episodes = evaluate(policy.act, state.seeds, met)
         episodes.to_parquet(path / f"{variant}-episodes.parquet")
 """
 EMULATED = ("Haswell-v4", "Skylake-Client", "EPYC-v3")

@@ -23,10 +23,13 @@ from reacher_shaping.training.policy import Policy, initialise
 HIDDEN = 8
 
 
-def network_of(rows, seed, hidden):
+def network_of(parameters, seed, hidden):
     """One seed of a stack as a torch.nn.Module of the same precision."""
-    towers = rows.shape[1] // parameter_count(Shape(10, 2, hidden))
-    network, policy = Network(hidden, separate=towers == 2).to(rows.dtype), Policy(rows, Shape(10, 2, hidden, towers))
+    towers = parameters.shape[1] // parameter_count(Shape(10, 2, hidden))
+    network, policy = (
+        Network(hidden, separate=towers == 2).to(parameters.dtype),
+        Policy(parameters, Shape(10, 2, hidden, towers)),
+    )
     network.load_state_dict({name: tensor[seed] for name, tensor in policy.weights().items()})
     return network
 
@@ -40,18 +43,18 @@ def random_problem(key, *, seeds=3, count=64, hidden=HIDDEN, dtype=torch.float64
 
     options = PPO(hidden_units=hidden, networks=networks)
     shape = Shape(10, 2, hidden, options.towers)
-    rows = initialise(range(seeds), key, options, shape).double()
-    policy = Policy(rows, shape)
+    parameters = initialise(range(seeds), key, options, shape).double()
+    policy = Policy(parameters, shape)
     policy.layers.log_std[:] = 0.5 * normal(seeds, 2, 1) - 0.5
     features = torch.cat([normal(seeds, count, 10), torch.ones(seeds, count, 1, dtype=torch.float64)], dim=-1)
     action, log_prob = normal(seeds, count, 2), torch.empty(seeds, count, dtype=torch.float64)
     for seed in range(seeds):
         with torch.no_grad():
-            distribution, _ = network_of(rows, seed, hidden)(features[seed, :, :10])
+            distribution, _ = network_of(parameters, seed, hidden)(features[seed, :, :10])
             log_prob[seed] = distribution.log_prob(action[seed]).sum(-1)
     log_prob += spread * normal(seeds, count)
     fields = (features, action, log_prob, normal(seeds, count), 3 * normal(seeds, count))
-    return rows.to(dtype), ppo.pack(*(field.to(dtype).numpy() for field in fields))
+    return parameters.to(dtype), ppo.pack(*(field.to(dtype).numpy() for field in fields))
 
 
 def minibatch(samples, seed):
@@ -79,15 +82,15 @@ def test_gradient_agrees_with_autograd_to_one_in_a_billion(key, spread, clip, va
         entropy_coefficient=bonus,
         networks=networks,
     )
-    rows, records = random_problem(key, spread=spread, networks=networks)
+    parameters, records = random_problem(key, spread=spread, networks=networks)
     samples = ppo.unpack(records, 2)
-    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    learner = ppo.Learner(parameters, options, Shape.of(TASK, options))
     learner.differentiate(samples)
     ours = Policy(learner.gradient, Shape.of(TASK, options)).weights()
     owned = Policy.from_weights(ours, TASK).parameters  # what the weights do not name is zero in it
     assert torch.equal(learner.gradient.float(), owned)
-    for seed in range(len(rows)):
-        network = network_of(rows, seed, HIDDEN)
+    for seed in range(len(parameters)):
+        network = network_of(parameters, seed, HIDDEN)
         loss(network, options, *minibatch(samples, seed)).backward()
         for name, parameter in network.named_parameters():
             scale = max(parameter.grad.abs().max().item(), 1e-12)
@@ -140,13 +143,13 @@ def stable_ppo(samples, seed, network, options):
 
 def test_gradient_agrees_with_stable_baselines3s_ppo_on_the_same_minibatch():
     options = PPO()
-    rows, records = random_problem(11, hidden=64, seeds=2, dtype=torch.float32)
+    parameters, records = random_problem(11, hidden=64, seeds=2, dtype=torch.float32)
     samples = ppo.unpack(records, 2)
-    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    learner = ppo.Learner(parameters, options, Shape.of(TASK, options))
     learner.differentiate(samples)
     ours = Policy(learner.gradient, Shape.of(TASK, options)).weights()
     for seed in range(2):
-        network = network_of(rows, seed, 64)
+        network = network_of(parameters, seed, 64)
         model = stable_ppo(samples, seed, network, options)
         model.train()
         after = model.policy
@@ -199,8 +202,8 @@ def test_adam_is_torchs():
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_gradients_are_clipped_per_seed_as_torch_clips_one_network(scale):
     options = PPO(hidden_units=HIDDEN)
-    rows, records = random_problem(2)
-    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    parameters, records = random_problem(2)
+    learner = ppo.Learner(parameters, options, Shape.of(TASK, options))
     learner.differentiate(ppo.unpack(records, 2))
     learner.gradient *= scale * torch.tensor([[1.0], [10.0], [100.0]])
     before = Policy(learner.gradient.clone(), Shape.of(TASK, options)).weights()
@@ -217,13 +220,13 @@ def test_gradients_are_clipped_per_seed_as_torch_clips_one_network(scale):
 
 def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_order():
     options = PPO(hidden_units=HIDDEN, rollout_steps=96, minibatch_size=32, learning_rate=0.01)
-    rows, records = random_problem(3, count=96)
+    parameters, records = random_problem(3, count=96)
     shuffles = np.stack([[np.random.default_rng(10 * s + e).permutation(96) for e in range(3)] for s in range(3)])
-    networks = [network_of(rows, seed, HIDDEN) for seed in range(3)]
-    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    networks = [network_of(parameters, seed, HIDDEN) for seed in range(3)]
+    learner = ppo.Learner(parameters, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
     assert learner.adam.steps == 9
-    ours = Policy(rows, Shape.of(TASK, options)).weights()
+    ours = Policy(parameters, Shape.of(TASK, options)).weights()
     for seed, network in enumerate(networks):
         optimizer = torch.optim.Adam(network.parameters(), lr=0.01, eps=options.adam_epsilon)
         fields = minibatch(ppo.unpack(records, 2), seed)
@@ -240,13 +243,13 @@ def test_update_is_epochs_of_minibatches_of_torchs_own_steps_in_the_shuffled_ord
 @pytest.mark.parametrize("poison", ["weights", "records"])
 def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
     options = PPO()
-    rows, records = random_problem(4, hidden=64, count=128, dtype=torch.float32)
+    parameters, records = random_problem(4, hidden=64, count=128, dtype=torch.float32)
     shuffles = np.random.default_rng(4).permuted(np.tile(np.arange(128), (3, 2, 1)), axis=2)
-    clean = ppo.Learner(rows.clone(), options, Shape.of(TASK, options))
+    clean = ppo.Learner(parameters.clone(), options, Shape.of(TASK, options))
     clean.update(records, shuffles, options.learning_rate)
-    rows, records = rows.clone(), records.copy()
-    (rows if poison == "weights" else records)[1] = math.nan
-    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    parameters, records = parameters.clone(), records.copy()
+    (parameters if poison == "weights" else records)[1] = math.nan
+    learner = ppo.Learner(parameters, options, Shape.of(TASK, options))
     learner.update(records, shuffles, options.learning_rate)
     assert torch.equal(learner.parameters[[0, 2]], clean.parameters[[0, 2]])
     assert not torch.isfinite(learner.parameters[1]).any()
@@ -254,21 +257,21 @@ def test_a_seed_of_nans_changes_nothing_in_the_others(poison):
 
 def test_padding_of_the_rows_stays_zero():
     options = PPO()
-    rows, records = random_problem(5, hidden=64, dtype=torch.float32)
-    learner = ppo.Learner(rows, options, Shape.of(TASK, options))
+    parameters, records = random_problem(5, hidden=64, dtype=torch.float32)
+    learner = ppo.Learner(parameters, options, Shape.of(TASK, options))
     learner.update(records, np.tile(np.arange(64), (3, 5, 1)), options.learning_rate)
     used = sum(math.prod(layer.shape[1:]) for layer in learner.passes.layers)
-    assert used < rows.shape[1]
-    assert not rows[:, used:].any()
+    assert used < parameters.shape[1]
+    assert not parameters[:, used:].any()
 
 
 def test_diagnostics_are_those_stable_baselines3_logs():
     options = PPO()
-    rows, records = random_problem(6, hidden=64, seeds=2, dtype=torch.float32)
+    parameters, records = random_problem(6, hidden=64, seeds=2, dtype=torch.float32)
     samples = ppo.unpack(records, 2)
-    found = ppo.diagnose(Policy(rows, Shape.of(TASK, options)).passes(), records, options.clip_range)
+    found = ppo.diagnose(Policy(parameters, Shape.of(TASK, options)).passes(), records, options.clip_range)
     for seed in range(2):
-        model = stable_ppo(samples, seed, network_of(rows, seed, 64), options)
+        model = stable_ppo(samples, seed, network_of(parameters, seed, 64), options)
         model.train()
         logged = model.logger.name_to_value
         expected = {

@@ -83,7 +83,9 @@ def test_the_toy_task_is_learned_and_evaluated():
     assert (state.progress["episode_length"] == 30).all()
     first, last = state.episode_returns[:, :4].mean((1, 2)), state.episode_returns[:, -4:].mean((1, 2))
     assert (last > 0.6 * first).all(), "returns are negative"
-    conditions = Conditions(cell.protocol.environment, 1, 0.1, episodes=50, mode="deterministic")
+    conditions = Conditions(
+        environment=cell.protocol.environment, root_seed=1, success_radius=0.1, episodes=50, mode="deterministic"
+    )
     rows = evaluate(state.policy().act, [0, 1], conditions)
     still = evaluate(lambda observation, noise: np.zeros((*observation.shape[:2], 1)), [0], conditions)
     assert rows["final_distance"].mean() < 0.5 * still["final_distance"].mean()

@@ -239,6 +239,7 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     assert further
     assert further.items() <= checksums(kept).items(), "a study that was not made here stays"
     assert record["experiments"]["released"] == earlier["released"]
+    assert len(record["peers"]) > 0, "those of the studies that stay"
     assert record["blocks"][2]["cell"] == {
         "protocol": "paper",
         "variant": "decay200k_l2sq",

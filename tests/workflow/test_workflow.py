@@ -22,6 +22,11 @@ FURTHER = {
     },
     "peers": {"seeds": 1, "budgets": {"ppo": 2048}}, "lengths": True,
 }  # fmt: skip
+APART = {
+    "title": "Apart", "question": "Elsewhere?", "seeds": 1, "root_seed": 11,
+    "grid": [{"protocol": "sparse50", "variants": ["none"], "budgets": [2048]}],
+    "peers": {"seeds": 1, "budgets": {"ppo": 2048}},
+}  # fmt: skip
 LEDGER = """
 - {study: mine, measure: final_success_rate, error: 0.05, hypotheses: [
   {id: M1, claim: Ends differ., predicts: positive, a: [standard, none, 1], b: [paper, none, 1]}]}
@@ -379,11 +384,10 @@ def test_further_study_is_a_target_of_its_name_and_joins_the_report(project, tmp
         targets = read_table(folder / "targets.parquet", schemas.TARGETS)
         assert targets.groupby("protocol")["episodes"].sum().eq(2 * runs["episodes"].iloc[0]).all()
         assert set(read_table(folder / "lengths.parquet", schemas.LENGTHS)["protocol"]) == set(runs["protocol"])
-        peer = read_json(folder / "peers/ppo/seed0.json")["settings"]
-        first = read_json(copy.folder / "results/standard/none/2048/alpha1/seeds0-0/manifest.json")["settings"]["cell"]
-        assert {name: peer[name] for name in ("root_seed", "protocol")} == {
-            name: first[name] for name in ("root_seed", "protocol")
-        }
+        with copy.configured(experiments={"apart": APART}):
+            copy.run("results/experiments/apart/peers/ppo/seed0.json")
+        peer = read_json(folder.with_name("apart") / "peers/ppo/seed0.json")["settings"]
+        assert (peer["root_seed"], peer["evaluation"]["radius"], peer["protocol"]["name"]) == (11, 0.05, "sparse50")
         assert copy.planned("mine") == {}
         copy.run("--allowed-rules", "build_report", "--", "report/report.html")
         page = (copy.folder / "report/report.html").read_text()

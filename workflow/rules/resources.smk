@@ -30,7 +30,7 @@ def evaluation_minutes(wildcards, attempt):
     """By the block's evaluation episodes, those of the long evaluation's added."""
     cell, seeds = CELLS[wildcards.cell], SEEDS[wildcards.block]
     steps = (cost.evaluation_steps(cell, STUDY.evaluation) + cost.LONG_STEPS) * len(seeds)
-    return attempt * minutes(steps / SLOW_EVALUATION_STEPS_PER_SECOND)
+    return attempt * minutes(steps * cost.evaluation_work(cell.protocol) / SLOW_EVALUATION_STEPS_PER_SECOND)
 
 
 # Jobs of seconds, not worth a place in a queue. Where Snakemake itself may not work on the login node, submit it as a job.

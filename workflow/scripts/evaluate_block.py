@@ -25,7 +25,12 @@ environment = Environment.model_validate_json(params.environment)
 with logged(snakemake):
     trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training, json.loads(params.asked)))
     policy = Policy.from_weights(trained.weights, load_task(environment.task))
-    conditions = Conditions(environment, params.root_seed, evaluation.radius, evaluation.episodes)
+    conditions = Conditions(
+        environment=environment,
+        root_seed=params.root_seed,
+        success_radius=evaluation.radius,
+        episodes=evaluation.episodes,
+    )
     modes: tuple[Mode, ...] = ("stochastic", "deterministic")
     frames = [evaluate(policy.act, trained.seeds, replace(conditions, mode=mode)) for mode in modes]
     episodes = pd.concat(frames, ignore_index=True)

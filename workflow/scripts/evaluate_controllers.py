@@ -20,10 +20,10 @@ with logged(snakemake):
     rows = [
         evaluate_controllers(
             Conditions(
-                protocol.environment,
-                params.root_seed,
-                protocol.environment.radius(evaluation.radius),
-                evaluation.episodes,
+                environment=protocol.environment,
+                root_seed=params.root_seed,
+                success_radius=protocol.environment.radius(evaluation.radius),
+                episodes=evaluation.episodes,
             ),
             protocol.ppo,
         ).assign(protocol=protocol.name)

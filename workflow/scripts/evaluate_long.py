@@ -26,7 +26,12 @@ with logged(snakemake):
     long = evaluate_lengths(
         Policy.from_weights(trained.weights, load_task(environment.task)).act,
         trained.seeds,
-        Conditions(environment, params.root_seed, evaluation.radius, EPISODES),
+        Conditions(
+            environment=environment,
+            root_seed=params.root_seed,
+            success_radius=evaluation.radius,
+            episodes=EPISODES,
+        ),
     )
     write_table(output.episodes, long, block_schemas.LONG_EPISODES)
     steps = int((long["steps"] * long["episodes"]).sum())

@@ -19,9 +19,10 @@ with logged(snakemake):
     trained = read_policy(unchanged(snakemake.input.policy, snakemake.input.training, json.loads(params.asked)))
     weights = {name: tensor[:1] for name, tensor in trained.weights.items()}
     first = Policy.from_weights(weights, load_task(environment.task))
-    episode = video.evaluation_episode(
-        first.act, trained.seeds[0], Conditions(environment, params.root_seed, params.radius, episodes=1)
+    conditions = Conditions(
+        environment=environment, root_seed=params.root_seed, success_radius=params.radius, episodes=1
     )
+    episode = video.evaluation_episode(first.act, trained.seeds[0], conditions)
     pictures = video.frames(episode, f"{snakemake.wildcards.name}, seed {trained.seeds[0]}")
     video.write_video(snakemake.output.gif, pictures)
     video.write_video(snakemake.output.mp4, pictures)

@@ -20,7 +20,13 @@ folder = Path(snakemake.output.summary).parent
 
 
 def conditions(cell: Cell, mode: Mode) -> Conditions:
-    return Conditions(cell.protocol.environment, cell.root_seed, params.radius, params.episodes, mode)
+    return Conditions(
+        environment=cell.protocol.environment,
+        root_seed=cell.root_seed,
+        success_radius=params.radius,
+        episodes=params.episodes,
+        mode=mode,
+    )
 
 
 def kept(

@@ -14,8 +14,8 @@ from reacher_shaping.storage.files import write_json, write_table
 from reacher_shaping.storage.provenance import Record
 
 record = Record()
-settings = json.loads(snakemake.params.settings)
 params, wildcards, output = snakemake.params, snakemake.wildcards, snakemake.output
+settings = json.loads(params.settings)
 
 with logged(snakemake) as say:
     run = sb3_baselines.peer_run(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import stats as distributions
 
 from reacher_shaping.evaluation.evaluate import Actor, Conditions, Mode, evaluate
-from reacher_shaping.settings.cell import PPO
+from reacher_shaping.settings.cell import PPO, REACHERS
 from reacher_shaping.stats import wilson_interval
 from reacher_shaping.tasks.base import load_task
 from reacher_shaping.training.network import Shape
@@ -129,7 +129,7 @@ def evaluate_controllers(conditions: Conditions, network: PPO | None = None) -> 
         ("untrained network", "stochastic", untrained_network(root_seed, environment.task, network or PPO())),
         ("inverse kinematics + PD", "deterministic", reach(gains)),
     ]
-    if task.gymnasium_id != "Reacher-v5":
+    if environment.task not in REACHERS:
         actors = actors[:-1]
     rows = []
     for name, mode, act in actors:

@@ -24,7 +24,7 @@ LANES_PER_SEED = 50
 """Episodes of one seed that run side by side; fixed, so that results never depend on a chunk's size."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Conditions:
     """What policies meet in an evaluation; those that are compared meet the same.
 
@@ -49,7 +49,10 @@ class Conditions:
 def evaluate(act: Actor, seeds: Sequence[int], conditions: Conditions) -> pd.DataFrame:
     """Return the columns of `episodes.parquet`, a row per seed and episode, ordered by seed.
 
-    `act` are the policies of all S `seeds`, their names in the rows.
+    Args:
+        act: the policies of all seeds.
+        seeds: names of the S policies in the rows.
+        conditions: what all of them meet.
     """
     environment, episodes = conditions.environment, conditions.episodes
     task = load_task(environment.task)

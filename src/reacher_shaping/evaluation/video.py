@@ -15,6 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from reacher_shaping.evaluation.evaluate import Actor, Conditions, evaluate
 from reacher_shaping.random_streams import Purpose, stream
+from reacher_shaping.settings.cell import REACHERS
 from reacher_shaping.storage.files import replacing
 from reacher_shaping.tasks.base import Lanes, load_task
 from reacher_shaping.tasks.rendering import Pixels, drawn, find_opengl, rendered, view_of
@@ -98,7 +99,7 @@ def frames(episode: Episode, title: str) -> list[Image.Image]:
     Raises ValueError where no OpenGL is found for a task that cannot be drawn flat, any but Reacher.
     """
     opengl, moved = find_opengl(), view_of(episode.task).moved
-    if not opengl and not episode.task.startswith("reacher"):
+    if not opengl and episode.task not in REACHERS:
         raise ValueError(f"pictures of the task {episode.task} take OpenGL, and none is found here; see the README")
     with (
         rendered(opengl, SIZE, episode.task, episode.goal, episode.success_radius)

@@ -34,7 +34,8 @@ def require_display() -> None:
 def play(act: Actor, conditions: Conditions) -> float:
     """Show episodes on the study's evaluation resets, until the last or until the window is closed.
 
-    `act` is an actor of S = 1. Returns the mean return of the episodes shown to their end, NaN if there are none.
+    `act` is an actor of S = 1; the episodes have the task's own length. Returns the mean return of those shown to their
+    end, NaN if there are none.
     Raises NoDisplayError, and ValueError for a task that is not among Gymnasium's own environments.
     """
     require_display()

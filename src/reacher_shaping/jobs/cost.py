@@ -13,9 +13,9 @@ from reacher_shaping.settings.cell import Cell, Protocol
 from reacher_shaping.settings.parts import Evaluation
 
 EPISODE_STEPS = {"reacher": 50, "reacher_closed_form": 50, "fetch_reach": 50, "pusher": 100}
-"""Of each task; its record says so too, but would load the simulation. Of a task that is not here 50 are counted."""
-SIMULATION = {"reacher": 1.0, "reacher_closed_form": 0.25, "fetch_reach": 36.0, "pusher": 3.0}
-"""How long a step of a task's simulation takes, that of Reacher being 1; so counts a task that is not here."""
+"""Of each task; its record says so too, but would load the simulation. A task that is not here counts as Reacher."""
+SIMULATION = {"reacher": 1.0, "reacher_closed_form": 0.2, "fetch_reach": 36.0, "pusher": 3.0}
+"""How long a step of a task's simulation takes, that of Reacher being 1."""
 
 MODES = 2
 """Every run is evaluated twice, stochastic and deterministic."""
@@ -56,11 +56,14 @@ def training_seconds(cell: Cell, seeds: int, rates: Rates) -> float:
     return rates.start + seeds * steps * work(cell.protocol) / rates.training
 
 
-def evaluation_steps(cell: Cell, evaluation: Evaluation) -> float:
-    """Return how many of Reacher's steps one run's evaluation is worth; near half of such a step is the simulation."""
-    task = cell.protocol.environment.task
-    steps = MODES * evaluation.episodes * EPISODE_STEPS.get(task, 50)
-    return steps * (0.55 + 0.45 * SIMULATION.get(task, 1.0))
+def evaluation_work(protocol: Protocol) -> float:
+    """Return the work of one environment step of evaluation, 1 for Reacher, near half of it the simulation."""
+    return 0.55 + 0.45 * SIMULATION.get(protocol.environment.task, 1.0)
+
+
+def evaluation_steps(cell: Cell, evaluation: Evaluation) -> int:
+    """Return the environment steps of one run's evaluation."""
+    return MODES * evaluation.episodes * EPISODE_STEPS.get(cell.protocol.environment.task, EPISODE_STEPS["reacher"])
 
 
 def job_seconds(rule: str, cell: Cell | None, evaluation: Evaluation, seeds: int, rates: Rates) -> float:
@@ -69,17 +72,19 @@ def job_seconds(rule: str, cell: Cell | None, evaluation: Evaluation, seeds: int
         return SMALL_JOB_SECONDS
     if rule == "train_block":
         return training_seconds(cell, seeds, rates)
-    if rule == "evaluate_block":
-        return rates.start + seeds * evaluation_steps(cell, evaluation) / rates.evaluation
-    return rates.start + seeds * LONG_STEPS / rates.evaluation if rule == "evaluate_long" else SMALL_JOB_SECONDS
+    steps = {"evaluate_block": evaluation_steps(cell, evaluation), "evaluate_long": LONG_STEPS}.get(rule)
+    if steps is None:
+        return SMALL_JOB_SECONDS
+    return rates.start + seeds * steps * evaluation_work(cell.protocol) / rates.evaluation
 
 
 def measured_rates(results: Path, reference: Path) -> Rates:
     """Return the rates of the blocks under `results`, else of the manifest of a reference run, else a guess."""
     found = {path.parent: _read(path) for path in results.glob("*/*/*/*/*/manifest.json")}
     records = list(found.values())
-    training = _rate((record, work(_protocol(record))) for record in records if "settings" in record)
-    evaluation = _rate((record.get("evaluation", {}), 1.0) for record in records)
+    told = [(record, _protocol(record)) for record in records if "settings" in record]
+    training = _rate((record, work(protocol)) for record, protocol in told)
+    evaluation = _rate((record.get("evaluation", {}), evaluation_work(protocol)) for record, protocol in told)
     if training and evaluation:
         source = f"the {len(records)} blocks in {results}"
         return Rates(training, evaluation, start=_start(results, found) or Rates.start, source=source)

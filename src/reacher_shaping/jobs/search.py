@@ -45,7 +45,12 @@ def score(cell: Cell, seeds: int, *, episodes: int, success_radius: float) -> di
     names = list(range(seeds))
     for state in train(cell, names, success_radius=success_radius):
         trained = state
-    conditions = Conditions(cell.protocol.environment, cell.root_seed, success_radius, episodes)
+    conditions = Conditions(
+        environment=cell.protocol.environment,
+        root_seed=cell.root_seed,
+        success_radius=success_radius,
+        episodes=episodes,
+    )
     rows = evaluate(trained.policy().act, names, conditions)
     return {name: float(rows[column].mean()) for name, column in MEASURES.items()}
 

@@ -33,6 +33,10 @@ LEARNED = names_reading("training.potentials", "rate")
 """Potentials that are learned, by a rate."""
 
 
+REACHERS = ("reacher", "reacher_closed_form")
+"""Tasks that are Gymnasium's Reacher, whatever steps it."""
+
+
 class Environment(Settings):
     """The task and its reward, the weight of the control cost, and whether actions are clipped."""
 

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from reacher_shaping.settings.base import ConfigError
-from reacher_shaping.settings.cell import Cell
+from reacher_shaping.settings.cell import REACHERS, Cell
 from reacher_shaping.settings.study import MAIN, Study
 from reacher_shaping.storage import tables as catalogue
 
@@ -38,9 +38,9 @@ def shown_cells(cells: Iterable[Cell]) -> dict[str, Cell]:
 
 
 def judged(design: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether a study is one of the paper's kind: some of its cells stand in the paper, and none twice in it."""
-    cells = [(cell["variant"], cell["budget"], cell["alpha0"], cell["group"]) for cell in design]
-    return len(set(cells)) == len(cells) and any(group != "extra" for *_, group in cells)
+    """Whether a study is one of the paper's kind: some of its cells stand in the paper, each under one protocol."""
+    cells = [(cell["variant"], cell["budget"], cell["alpha0"]) for cell in design if cell["group"] != "extra"]
+    return bool(cells) and len(set(cells)) == len(cells)
 
 
 def ledgers(entries: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
@@ -72,7 +72,7 @@ def features(study: Study, name: str, hypotheses: Collection[str]) -> frozenset[
         "peers": own.peers is not None,
         "lengths": own.lengths,
         "hypotheses": name in hypotheses,
-        "targets": name in hypotheses and all(cell.protocol.environment.task.startswith("reacher") for cell in cells),
+        "targets": name in hypotheses and all(cell.protocol.environment.task in REACHERS for cell in cells),
     }
     return frozenset(feature for feature, there in has.items() if there)
 

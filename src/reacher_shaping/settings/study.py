@@ -100,7 +100,8 @@ class Study(Settings):
             for name, entry in entries.items():
                 if entry.name != name:
                     raise ValueError(f"{kind}.{name}.name = {entry.name!r} must equal its key; leave it out")
-        for name in self.protocols:
+        for name, protocol in self.protocols.items():
+            _require_told(f"protocols.{name}.environment.task", protocol)
             if name in RESERVED_FOLDERS:
                 raise ValueError(f"protocols: the name {name!r} is a folder of results; allowed: any other name")
         if MAIN in self.experiments:
@@ -141,6 +142,11 @@ class Study(Settings):
             return
         cells = self.cells_of[name]
         protocol = cells[0].protocol
+        if protocol.environment.task == CLOSED_FORM:
+            raise ValueError(
+                f"experiments.{name}.peers train in Gymnasium's environment, the protocol {protocol.name} in "
+                f"{CLOSED_FORM}; allowed: peers of a protocol with the task reacher"
+            )
         budgets = {cell.budget for cell in cells if cell.protocol == protocol and cell.variant.name == "none"}
         for algorithm, budget in experiment.peers.budgets.items():
             if budget not in budgets:
@@ -224,10 +230,15 @@ def _require_possible(where: str, cell: Cell) -> None:
             f"{where}: cell {cell.name} learns a potential beyond an episode's end, where nothing counts; "
             f"allowed: a protocol with shaping.episode_end = 'bootstrap', unlike {protocol.name}"
         )
+    _require_told(where, protocol)
+
+
+def _require_told(where: str, protocol: Protocol) -> None:
+    """Raise ValueError where the name of a protocol does not tell that MuJoCo's arm is not stepped."""
     if protocol.environment.task == CLOSED_FORM and "closed_form" not in protocol.name:
         raise ValueError(
-            f"{where}: protocol {protocol.name} has the task {CLOSED_FORM}, which its tables are to tell; "
-            "allowed: a name with `closed_form` in it"
+            f"{where}: the task {CLOSED_FORM} is to be told by every table; "
+            f"allowed: a protocol with `closed_form` in its name, unlike {protocol.name}"
         )
 
 

@@ -56,29 +56,40 @@ def checksums(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): sha256(path) for path in files}
 
 
+def copy_kept(kept: Path, new: Path, place: str) -> None:
+    """Copy what a reference run has of one study, in its folder `place`, into another reference run.
+
+    Raises ArtifactError for a file that is not the one that its manifest has the checksum of.
+    """
+    told = read_json(kept / "manifest.json").get("tables", {})
+    for path in sorted(path for path in (kept / place).rglob("*") if path.is_file()):
+        name = str(path.relative_to(kept))
+        if sha256(path) != told.get(name):
+            raise ArtifactError(path, "is not the file that the reference run was kept with")
+        write_bytes(new / name, path.read_bytes())
+
+
 def objections(kept: Path, new: Path) -> list[str]:
     """Say what speaks against `new` in place of `kept`, both folders: what would be lost, blocks that cannot be traced.
 
-    Each has its manifest; an empty or missing `kept` loses nothing.
+    Each has its manifest; an empty or missing `kept` loses nothing. A study that stays as it was kept is not judged.
     """
-    record = read_json(new / "manifest.json")
-    found = []
+    record, found = read_json(new / "manifest.json"), []
+    before: Mapping[str, Any] = {"experiments": {}}
     if (kept / "manifest.json").exists():
-        before, now = (_runs(each) for each in (read_json(kept / "manifest.json"), record))
-        if now < before:
-            found.append(f"it has {now} runs of the main study, the one that is kept {before}")
+        before = read_json(kept / "manifest.json")
+        if _runs(record) < _runs(before):
+            found.append(f"it has {_runs(record)} runs of the main study, the one that is kept {_runs(before)}")
         lost = sorted(checksums(kept).keys() - checksums(new).keys())
         if lost:
             found.append(f"it lacks {len(lost)} files of the one that is kept, such as {lost[0]}")
-    blocks = [*record["blocks"], *(block for own in record["experiments"].values() for block in own)]
-    told = [block for block in blocks if "cell" in block]
-    if len(told) < len(blocks):
-        found.append(f"{len(blocks) - len(told)} of its {len(blocks)} blocks do not tell their cell")
+    made = [own for name, own in record["experiments"].items() if own != before["experiments"].get(name)]
+    blocks = [*record["blocks"], *(block for own in made for block in own)]
     unknown = sum(block["git"]["dirty"] is not False for block in blocks)
     if unknown:
         found.append(f"{unknown} of its {len(blocks)} blocks were not trained from a clean commit")
     codes: dict[str, set[str]] = {}  # another task or schedule is other code
-    for block in told:
+    for block in blocks:
         codes.setdefault(f"{block['cell']['variant']} on {block['task']}", set()).add(block["code"])
     several = sorted(name for name, hashes in codes.items() if len(hashes) > 1)
     if several:

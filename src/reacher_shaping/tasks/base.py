@@ -83,9 +83,9 @@ class Task:
     """An environment with its rewards; N lanes, F numbers observed, A of an action, D drawn for a reset, M measured.
 
     Attributes:
-        gymnasium_id: the environment that the lanes equal bit for bit.
+        gymnasium_id: the environment that the lanes equal: bit for bit, unless `batch` says otherwise.
         model: the whole model, for pictures.
-        simulated_model: the model that is stepped; it may lack what no number depends on.
+        simulated_model: the model that MuJoCo steps; it may lack what no number depends on.
         frame_skip: solver steps of an environment step.
         step_seconds: simulated seconds of an environment step.
         episode_steps: environment steps of an episode; every episode has as many.
@@ -104,7 +104,7 @@ class Task:
         bounds: what results must keep to.
         settle: changes the state after an environment step, before all positions are computed anew; None where the
             environment leaves them as the last solver step did.
-        batch: makes N simulations that are not MuJoCo's; None where `simulated_model` is stepped.
+        batch: makes N simulations that are not MuJoCo's, and equal to rounding; None where MuJoCo steps.
     """
 
     gymnasium_id: str

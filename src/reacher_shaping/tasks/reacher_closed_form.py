@@ -1,6 +1,6 @@
 """Reacher-v5 with the arm's equations of motion solved directly instead of by MuJoCo: the same task, not the same bits.
 
-For studies of hundreds of seeds, searches and power, where MuJoCo's step is a third of the time. The arm is a planar
+For studies of hundreds of seeds, searches and power. The arm is a planar
 double pendulum without gravity, whose joints have an inertia of their own (`armature`) beside that of the links:
 
     M(q) q'' = 200 u - d q' - c(q, q') + J f
@@ -10,7 +10,7 @@ of the elbow's soft stop. With one constraint MuJoCo's convex problem has a solu
 chapter Computation, Constraint model): f = max(0, (a_ref - J q''_free) / (J M^-1 J' + R)). Integrated as MuJoCo does,
 by the classical Runge-Kutta scheme of order 4. Agrees with it to rounding, at the stop to its solver's tolerance.
 
-Everything else is the task `reacher`. Numbers of the arm are read from its model, so they stand there alone.
+Everything else is the task `reacher`. The arm's numbers are read from its model.
 """
 
 from dataclasses import replace
@@ -45,6 +45,7 @@ class Arms:
         self._links = np.array([model.body_pos[2, 0], model.body_pos[reacher.TIP, 0]])
         self._tip_height = model.body_pos[1, 2]
         self._damping, self._gear = model.dof_damping[:, None], model.actuator_gear[:, :1]
+        self._lowest, self._highest = model.actuator_ctrlrange.T[..., None]
         self._timestep = model.opt.timestep
         self._inertia(model)
         self._stop(model)
@@ -81,7 +82,7 @@ class Arms:
 
     def step(self, nstep: int) -> None:
         """Advance all arms by `nstep` solver steps; the fingertips stay where the last of their stages had them."""
-        torque = self._gear * np.clip(self._fields["ctrl"].T, -1, 1)
+        torque = self._gear * np.clip(self._fields["ctrl"].T, self._lowest, self._highest)
         position, velocity = self.state[:, :2].T.copy(), self.state[:, 2:].T.copy()
         for _ in range(nstep):
             position, velocity, last = self._runge_kutta(position, velocity, torque)
@@ -137,9 +138,10 @@ class Arms:
 
     def _place(self, position: Array) -> None:
         """Write the fingertips of positions [2, N]."""
-        along = np.stack([position[0], position[0] + position[1]])
-        tip = self._fields["xpos"][:, reacher.TIP]
-        tip[:, 0], tip[:, 1] = self._links @ np.cos(along), self._links @ np.sin(along)
+        upper, fore = self._links
+        along, tip = position[0] + position[1], self._fields["xpos"][:, reacher.TIP]
+        tip[:, 0] = upper * np.cos(position[0]) + fore * np.cos(along)
+        tip[:, 1] = upper * np.sin(position[0]) + fore * np.sin(along)
         tip[:, 2] = self._tip_height
 
 
