@@ -101,20 +101,28 @@ def test_a_policy_trained_on_it_goes_on_after_a_kill_as_if_there_had_been_none(t
     assert torch.equal(alone.parameters[0], whole.parameters[1])
 
 
-def test_what_is_made_with_it_says_so_by_its_protocols_name():
+@pytest.mark.parametrize(("name", "allowed"), [("fast", False), ("paper_closed_form", True)])
+def test_what_is_made_with_it_says_so_by_its_protocols_name(name, allowed):
     settings = read_settings("config.yaml")
-    fast = {"from": "paper", "environment": {"task": "reacher_closed_form"}}
-    row = {"variants": ["none"], "budgets": [500_000]}
-    for name, allowed in (("fast", False), ("paper_closed_form", True)):
-        settings["protocols"][name] = fast
-        settings["experiments"]["many"] = {
-            "title": "T",
-            "question": "Q",
-            "seeds": 2,
-            "grid": [{"protocol": name, **row}],
-        }
-        if allowed:
-            assert load_study(settings).cells_of["many"][0].protocol.name == name
-        else:
-            with pytest.raises(ValueError, match=r"protocols.fast.environment.task: .* with `closed_form` in its name"):
-                load_study(settings)
+    settings["protocols"][name] = {"from": "paper", "environment": {"task": "reacher_closed_form"}}
+    if allowed:
+        assert load_study(settings).protocols[name].environment.task == "reacher_closed_form"
+    else:
+        with pytest.raises(ValueError, match=r"protocols.fast.environment.task: .* with `closed_form` in its name"):
+            load_study(settings)
+
+
+def test_a_row_that_takes_it_is_refused_too_and_so_are_peers():
+    settings = read_settings("config.yaml")
+    row = {"protocol": "standard", "variants": ["none"], "budgets": [500_000]}
+    closed = row | {"environment": {"task": "reacher_closed_form"}}
+    settings["experiments"]["many"] = {"title": "Many", "question": "Why?", "seeds": 2, "grid": [closed]}
+    with pytest.raises(ValueError, match=r"many: .* with `closed_form` in its name, unlike standard"):
+        load_study(settings)
+    settings["protocols"]["closed_form"] = {"from": "standard", "environment": {"task": "reacher_closed_form"}}
+    settings["experiments"]["many"] |= {
+        "grid": [row | {"protocol": "closed_form"}],
+        "peers": {"seeds": 1, "budgets": {"ppo": 500_000}},
+    }
+    with pytest.raises(ValueError, match=r"experiments.many.peers train in Gymnasium's environment"):
+        load_study(settings)
