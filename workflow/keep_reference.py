@@ -11,8 +11,8 @@ keeps the policies of `results/policies` alone, and leaves all else of the refer
 keeps the report of the reference run, as `make report` builds it where there are no results, in `report/site`: one page
 and one PDF to read without building anything, and for a static host to serve as they are.
 
-The folder is made anew beside the old one and takes its place whole; a further study that `results/` does not have
-stays as it was kept, with the records of its own blocks. Ends with 1, and changes nothing, where something would be
+The folder is made anew beside the old one and takes its place whole; what targets of their own make
+and `results/` does not have, further studies, peers and the search, stays as it was kept. Ends with 1, and changes nothing, where something would be
 lost or a block cannot be traced to a commit; --force keeps the run all the same, and says what spoke against it.
 """
 
@@ -43,6 +43,7 @@ from reacher_shaping.storage.reference import (
     published_bits,
     replaced,
 )
+from reacher_shaping.storage.tables import TABLES
 
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 BUILT, SITE = Path("build/reference/report"), Path("report/site")
@@ -64,16 +65,10 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
     hypotheses = outputs.ledgers(yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8")))
-    before = (
-        read_json(KEPT / "manifest.json") if (KEPT / "manifest.json").exists() else {"experiments": {}, "peers": []}
-    )
-    further, earlier = {}, {}
+    further = {}
     for name, own in study.studies.items():
         tables, place = outputs.tables_of(study, name, hypotheses), outputs.folder(name)
         if name != MAIN and not all((RESULTS / place / file).exists() for file in tables.values()):
-            if name in before["experiments"]:
-                copy_kept(KEPT, folder, place)
-                earlier[name] = before["experiments"][name]
             continue
         keep_tables(RESULTS / place, folder / place, tables)
         if name != MAIN:
@@ -84,15 +79,27 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     shutil.copyfile(figure, folder / FIGURE)
     peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
     record = manifest(study.model_dump(mode="json"), settings_hash(study), blocks, further, peers)
-    record["experiments"] |= earlier
-    if any(study.experiments[name].peers for name in earlier):
-        files = [peer["outputs"] for peer in record["peers"]]
-        record["peers"] += [peer for peer in before["peers"] if peer["outputs"] not in files]
-    if earlier:
-        print(f"Not in results/, so as they were kept: {', '.join(earlier)}", file=sys.stderr)
+    if (KEPT / "manifest.json").exists():
+        keep_others(study, folder, record)
     record["tables"] = checksums(folder)
     write_json(folder / "manifest.json", record)
     return record
+
+
+def keep_others(study: Study, folder: Path, record: dict[str, Any]) -> None:
+    """Add what targets of their own make and were not asked for here, as it was kept: it is told in `record` too."""
+    before = read_json(KEPT / "manifest.json")
+    names = [name for name in study.experiments if name in before["experiments"] and name not in record["experiments"]]
+    files = [TABLES[name].file for name in ("peers", "trials")]
+    files = [file for file in files if (KEPT / file).exists() and not (folder / file).exists()]
+    for place in (*map(outputs.folder, names), *files):
+        copy_kept(KEPT, folder, place)
+    record["experiments"] |= {name: before["experiments"][name] for name in names}
+    made = [peer["outputs"] for peer in record["peers"]]
+    if TABLES["peers"].file in files or any(study.experiments[name].peers for name in names):
+        record["peers"] += [peer for peer in before["peers"] if peer["outputs"] not in made]
+    if names or files:
+        print(f"Not in results/, so as they were kept: {', '.join((*names, *files))}", file=sys.stderr)
 
 
 def main() -> None:

@@ -57,12 +57,12 @@ def checksums(folder: Path) -> dict[str, str]:
 
 
 def copy_kept(kept: Path, new: Path, place: str) -> None:
-    """Copy what a reference run has of one study, in its folder `place`, into another reference run.
+    """Copy what a reference run has in `place`, a study's folder or one file, into another reference run.
 
     Raises ArtifactError for a file that is not the one that its manifest has the checksum of.
     """
     told = read_json(kept / "manifest.json").get("tables", {})
-    for path in sorted(path for path in (kept / place).rglob("*") if path.is_file()):
+    for path in sorted(path for path in ((kept / place), *(kept / place).rglob("*")) if path.is_file()):
         name = str(path.relative_to(kept))
         if sha256(path) != told.get(name):
             raise ArtifactError(path, "is not the file that the reference run was kept with")
