@@ -11,9 +11,9 @@ keeps the policies of `results/policies` alone, and leaves all else of the refer
 keeps the report of the reference run, as `make report` builds it where there are no results, in `report/site`: one page
 and one PDF to read without building anything, and for a static host to serve as they are.
 
-The folder is made anew beside the old one and takes its place whole; what targets of their own make
-and `results/` does not have, further studies, peers and the search, stays as it was kept. Ends with 1, and changes nothing, where something would be
-lost or a block cannot be traced to a commit; --force keeps the run all the same, and says what spoke against it.
+The folder is made anew beside the old one and takes its place whole; what targets of their own make and `results/` does
+not have, further studies, peers and the search, stays as it was kept. Ends with 1, and changes nothing, where something
+would be lost or a block cannot be traced to a commit; --force keeps the run all the same, and says what is against it.
 """
 
 import argparse
