@@ -1,11 +1,12 @@
-"""Does the engine learn what the plain loop learns? Both train one cell; their final policies are compared.
+"""Does the engine learn what the plain loop learns, and with the arm in closed form what it learns with MuJoCo's?
 
     python benchmarks/learning.py --variant none --budget 500000 --seeds 3 --out benchmarks/learning.json
+    python benchmarks/learning.py --other "closed form" --seeds 10 --out benchmarks/learning_closed_form.json
 
-The plain loop (tests/oracles/plain_loop.py) has the engine's random streams, so a seed starts from the same numbers in
-both and drifts apart only by rounding, which training amplifies: after a whole run the two are samples of one
-distribution.
-The engine trains ten seeds in the time of a fraction of one plain run.
+Both train one cell; their final policies are compared in MuJoCo's environment. The plain loop
+(tests/oracles/plain_loop.py) has the engine's random streams, as the closed form has: a seed starts from the same
+numbers in both and drifts apart only by rounding, which training amplifies. After a whole run the two are samples of one
+distribution. The engine trains ten seeds in the time of a fraction of one plain run.
 """
 
 # ruff: noqa: E402 (the environment of a job must be set before the imports)
@@ -33,10 +34,20 @@ sys.path.insert(0, str(ROOT / "tests" / "oracles"))
 import plain_loop
 
 ENGINE_SEEDS = 10
+MEASURES = {
+    "success_rate": "success",
+    "final_success_rate": "final_success",
+    "mean_return": "episode_return",
+    "final_distance": "final_distance",
+    "share_within_radius": "share_within_radius",
+}
+"""Means over episodes, by their columns."""
+RADIUS = 0.02
+"""m; in the progress rows, which nothing here reads."""
 
 
 def measures(policy, seeds, cell, study):
-    """Success rate and mean return of each seed [S] over the study's evaluation."""
+    """`MEASURES` of each seed [S] over the study's evaluation."""
     episodes = evaluate(
         policy.act,
         seeds,
@@ -47,10 +58,7 @@ def measures(policy, seeds, cell, study):
             episodes=study.evaluation.episodes,
         ),
     ).groupby("seed")
-    return {
-        "success_rate": episodes["success"].mean().to_list(),
-        "mean_return": episodes["episode_return"].mean().to_list(),
-    }
+    return {name: episodes[column].mean().to_list() for name, column in MEASURES.items()}
 
 
 def plain_policy(cell, seed):
@@ -64,29 +72,44 @@ def plain_policy(cell, seed):
     return Policy.from_weights(weights, TASK)
 
 
+def plain_policies(cell, seeds):
+    """Yield the names and the policy of one seed after the other."""
+    for seed in range(seeds):
+        yield [seed], plain_policy(cell, seed)
+
+
+def closed_form_policies(cell, seeds):
+    """Yield the names and the policies of all seeds, trained together."""
+    environment = cell.protocol.environment.model_copy(update={"task": "reacher_closed_form"})
+    closed = cell.model_copy(update={"protocol": cell.protocol.model_copy(update={"environment": environment})})
+    *_, state = train(closed, range(seeds), success_radius=RADIUS)
+    yield list(range(seeds)), state.policy()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--variant", default="none")
     parser.add_argument("--budget", type=int, default=500_000)
-    parser.add_argument("--seeds", type=int, default=3, help="of the plain loop")
+    parser.add_argument("--other", choices=("plain loop", "closed form"), default="plain loop")
+    parser.add_argument("--seeds", type=int, default=3, help="of the other")
     parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "learning.json")
     given = parser.parse_args()
     study = load_study(ROOT / "config.yaml")
     cell = next(cell for cell in study.cells if (cell.variant.name, cell.budget) == (given.variant, given.budget))
 
-    plain = {"success_rate": [], "mean_return": []}
-    for seed in range(given.seeds):
-        for name, values in measures(plain_policy(cell, seed), [seed], cell, study).items():
-            plain[name] += values
-            print(f"plain loop, seed {seed}: {name} {values[0]:.3f}", flush=True)
-    *_, state = train(cell, range(ENGINE_SEEDS), success_radius=study.evaluation.radius)
+    trained = closed_form_policies if given.other == "closed form" else plain_policies
+    other = {name: [] for name in MEASURES}
+    for seeds, policy in trained(cell, given.seeds):
+        for name, values in measures(policy, seeds, cell, study).items():
+            other[name] += values
+            print(f"{given.other}, seeds {seeds}: {name} {np.mean(values):.3f}", flush=True)
+    *_, state = train(cell, range(ENGINE_SEEDS), success_radius=RADIUS)
     engine = measures(state.policy(), list(range(ENGINE_SEEDS)), cell, study)
 
-    found = {"cell": cell.name, "plain": plain, "engine": engine, "welch_p": {}}
-    for name in plain:
-        found["welch_p"][name] = float(stats.ttest_ind(plain[name], engine[name], equal_var=False).pvalue)
-        rows = (("plain loop", plain[name]), ("engine", engine[name]))
-        for label, values in rows:
+    found = {"cell": cell.name, given.other: other, "engine": engine, "welch_p": {}}
+    for name in MEASURES:
+        found["welch_p"][name] = float(stats.ttest_ind(other[name], engine[name], equal_var=False).pvalue)
+        for label, values in ((given.other, other[name]), ("engine", engine[name])):
             spread = np.std(values, ddof=1) if len(values) > 1 else float("nan")
             print(f"{name}, {label}: {np.mean(values):.3f} (sd {spread:.3f}, {len(values)} seeds)")
         print(f"{name}: Welch p = {found['welch_p'][name]:.2f}")
