@@ -5,8 +5,8 @@
 
 Both train one cell; their final policies are compared in MuJoCo's environment. The plain loop
 (tests/oracles/plain_loop.py) has the engine's random streams, as the closed form has: a seed starts from the same
-numbers in both and drifts apart only by rounding, which training amplifies. After a whole run the two are samples of one
-distribution. The engine trains ten seeds in the time of a fraction of one plain run.
+numbers in both and drifts apart only by rounding, which training amplifies. After a whole run the two are samples of
+one distribution. The engine trains ten seeds in the time of a fraction of one plain run.
 """
 
 # ruff: noqa: E402 (the environment of a job must be set before the imports)
