@@ -60,8 +60,8 @@ def manifests(study: Study, cells: Iterable[Cell], seeds: int) -> list[dict[str,
     return found
 
 
-def write_folder(study: Study, folder: Path) -> dict[str, Any]:
-    """Write all of the reference run into an empty folder; return its manifest."""
+def write_folder(study: Study, folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """Write all of the reference run into an empty folder; return its manifest, and what stays as it was kept."""
     blocks = manifests(study, study.cells, study.seeds)
     write_json(folder / "bits.json", published_bits(blocks))
     hypotheses = outputs.ledgers(yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8")))
@@ -79,15 +79,14 @@ def write_folder(study: Study, folder: Path) -> dict[str, Any]:
     shutil.copyfile(figure, folder / FIGURE)
     peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
     record = manifest(study.model_dump(mode="json"), settings_hash(study), blocks, further, peers)
-    if (KEPT / "manifest.json").exists():
-        keep_others(study, folder, record)
+    others = keep_others(study, folder, record) if (KEPT / "manifest.json").exists() else []
     record["tables"] = checksums(folder)
     write_json(folder / "manifest.json", record)
-    return record
+    return record, others
 
 
-def keep_others(study: Study, folder: Path, record: dict[str, Any]) -> None:
-    """Add what targets of their own make and were not asked for here, as it was kept: it is told in `record` too."""
+def keep_others(study: Study, folder: Path, record: dict[str, Any]) -> list[str]:
+    """Add what targets of their own make and were not asked for here, as it was kept, to `record` too; return what."""
     before = read_json(KEPT / "manifest.json")
     names = [name for name in study.experiments if name in before["experiments"] and name not in record["experiments"]]
     files = [TABLES[name].file for name in ("peers", "trials")]
@@ -98,8 +97,7 @@ def keep_others(study: Study, folder: Path, record: dict[str, Any]) -> None:
     made = [peer["outputs"] for peer in record["peers"]]
     if TABLES["peers"].file in files or any(study.experiments[name].peers for name in names):
         record["peers"] += [peer for peer in before["peers"] if peer["outputs"] not in made]
-    if names or files:
-        print(f"Not in results/, so as they were kept: {', '.join((*names, *files))}", file=sys.stderr)
+    return [*names, *files]
 
 
 def main() -> None:
@@ -122,7 +120,7 @@ def main() -> None:
         return
     study = load_study(read_settings("config.yaml", *options.overlay))
     with replaced(KEPT) as folder:
-        record = write_folder(study, folder)
+        record, others = write_folder(study, folder)
         against = objections(KEPT, folder)
         if against and not options.force:
             raise ValueError(f"results/ does not become the reference run: {'; '.join(against)}. --force keeps it")
@@ -132,6 +130,8 @@ def main() -> None:
         readme = put_headline(README.read_text(encoding="utf-8"), text)
     write_text(README, readme)
     print(f"The reference run: {KEPT} and README.md")
+    if others:
+        print(f"Not in results/, so as they were kept: {', '.join(others)}")
 
 
 if __name__ == "__main__":
