@@ -126,7 +126,7 @@ def test_welch_interval_by_hand():
 # Correlations
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(3, 30))
 def test_correlations_agree_with_scipy(seed, size):
     x, y = rng(seed).normal(size=(2, size))
@@ -173,7 +173,7 @@ def test_paired_comparison_is_students_on_the_pairs_in_which_both_finished():
     np.testing.assert_allclose((found.low, found.high), oracle.confidence_interval())
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_p_is_below_five_per_cent_exactly_where_the_interval_excludes_zero(seed):
     found = stats.paired_comparison(rng(seed).normal(0.5, 1, 8), np.zeros(8))
@@ -193,7 +193,7 @@ def test_holm_by_hand():
     assert stats.holm([]).size == 0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=8))
 def test_holm_lies_between_raw_and_bonferroni(p):
     adjusted = stats.holm(p)

@@ -39,7 +39,7 @@ def test_measures_by_hand():
     assert found["roughness"] == pytest.approx(np.std(differences, ddof=1) / (60 / 160 * 10 + 100 / 160 * 30))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 260), st.floats(0.1, 100))
 def test_drop_is_never_negative_and_roughness_has_no_scale(seed, iterations, scale):
     curves = -20 + np.random.default_rng(seed).normal(size=(3, iterations)).cumsum(axis=1)

@@ -51,7 +51,7 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(NASTY | st.text(max_size=5), inner, max_size=3),
     max_leaves=4,
 )
-MANY = settings(max_examples=1000, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+MANY = settings(max_examples=1000, suppress_health_check=list(HealthCheck), derandomize=True)
 
 
 def places(value, path=()):
@@ -219,7 +219,7 @@ def test_mutations_do_change_files():
     content = np.random.default_rng(0).bytes(1000)
     changed = []
 
-    @settings(max_examples=200, deadline=None, derandomize=True)
+    @settings(max_examples=200, derandomize=True)
     @given(mutations())
     def count(damage):
         changed.append(damage(content) != content)

@@ -63,7 +63,7 @@ def minibatch(samples, seed):
     return tuple(torch.from_numpy(np.ascontiguousarray(field)) for field in fields)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     key=st.integers(0, 2**31),
     spread=st.sampled_from([0.0, 0.1, 0.5, 3.0]),
