@@ -51,12 +51,16 @@ FIGURE = "headline.svg"
 
 
 def manifests(study: Study, cells: Iterable[Cell], seeds: int) -> list[dict[str, Any]]:
-    """The manifests of the blocks of cells. Raises ArtifactError for a block that was made with other settings."""
+    """The manifests of the blocks of cells, each with what its training chose by name, under `chosen`.
+
+    Raises ArtifactError for a block that was made with other settings.
+    """
     found = []
     for cell in cells:
         for block in study.blocks(seeds):
             path = RESULTS / cell.folder / block_name(block) / "manifest.json"
-            found.append(require_asked(path, {"settings": {"cell": cell.settings()}, "seeds": list(block)}))
+            record = require_asked(path, {"settings": {"cell": cell.settings()}, "seeds": list(block)})
+            found.append(record | {"chosen": list(cell.chosen_code)})
     return found
 
 

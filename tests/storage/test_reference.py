@@ -223,6 +223,9 @@ def test_report_to_read_is_that_of_the_reference_run():
     assert b'href="notebooks/' not in page, "no notebook lies beside it"
 
 
+CHOSEN = "tasks.reacher:TASK, training.potentials:l2"
+
+
 def kept_folder(folder, *, runs=2, files=("runs.parquet",), dirty=False, codes=("a", "a")):
     """A reference run of two blocks of one cell, of empty tables."""
     for name in files:
@@ -232,6 +235,7 @@ def kept_folder(folder, *, runs=2, files=("runs.parquet",), dirty=False, codes=(
         {
             "cell": cell,
             "task": "reacher",
+            "chosen": CHOSEN.split(", "),
             "seeds": list(range(runs)),
             "code": code,
             "git": {"commit": "c", "dirty": dirty},
@@ -255,11 +259,20 @@ def test_run_that_loses_nothing_and_is_traced_may_be_the_reference(tmp_path):
         ({"files": ()}, "it lacks 1 files of the one that is kept, such as runs.parquet"),
         ({"dirty": True}, "2 of its 2 blocks were not trained from a clean commit"),
         ({"dirty": None}, "2 of its 2 blocks were not trained from a clean commit"),
-        ({"codes": ("a", "b")}, "its blocks of l2 on reacher were trained by 2 different codes"),
+        ({"codes": ("a", "b")}, f"its blocks with {CHOSEN} were trained by 2 different codes"),
     ],
 )
 def test_what_a_new_reference_would_lose_or_cannot_tell_is_said(tmp_path, changes, said):
     assert objections(kept_folder(tmp_path / "kept"), kept_folder(tmp_path / "new", **changes)) == [said]
+
+
+def test_another_potential_is_other_code_and_nothing_against_it(tmp_path):
+    """A protocol may have a potential of its own for all decays: one variant, two potentials."""
+    new = kept_folder(tmp_path / "new", codes=("a", "b"))
+    record = json.loads((new / "manifest.json").read_text())
+    record["blocks"][1]["chosen"] = ["tasks.reacher:TASK", "training.potentials:l2sq"]
+    write_json(new / "manifest.json", record)
+    assert objections(tmp_path / "none", new) == []
 
 
 def test_a_study_that_stays_as_it_was_kept_is_not_judged_again(tmp_path):
@@ -272,7 +285,7 @@ def test_a_study_that_stays_as_it_was_kept_is_not_judged_again(tmp_path):
     assert objections(kept, new) == []
     record["experiments"] = {"mine": [record["blocks"][0] | {"code": "other"}]}
     write_json(new / "manifest.json", record)
-    assert objections(kept, new) == ["its blocks of l2 on reacher were trained by 2 different codes"]
+    assert objections(kept, new) == [f"its blocks with {CHOSEN} were trained by 2 different codes"]
 
 
 def test_a_kept_study_goes_over_as_it_was_or_not_at_all(tmp_path):

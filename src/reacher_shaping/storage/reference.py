@@ -88,12 +88,12 @@ def objections(kept: Path, new: Path) -> list[str]:
     unknown = sum(block["git"]["dirty"] is not False for block in blocks)
     if unknown:
         found.append(f"{unknown} of its {len(blocks)} blocks were not trained from a clean commit")
-    codes: dict[str, set[str]] = {}  # another task or schedule is other code
+    codes: dict[str, set[str]] = {}  # another task, potential or schedule is other code
     for block in blocks:
-        codes.setdefault(f"{block['cell']['variant']} on {block['task']}", set()).add(block["code"])
+        codes.setdefault(", ".join(block["chosen"]), set()).add(block["code"])
     several = sorted(name for name, hashes in codes.items() if len(hashes) > 1)
     if several:
-        found.append(f"its blocks of {several[0]} were trained by {len(codes[several[0]])} different codes")
+        found.append(f"its blocks with {several[0]} were trained by {len(codes[several[0]])} different codes")
     return found
 
 
@@ -147,7 +147,19 @@ def manifest(
     The records are without their inputs; each block's names its cell.
     """
     numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads", "kernels", "core_type")
-    kept = ("algorithm", "started", "finished", "seeds", "code", "git", "machine", "versions", "outputs", *numbers)
+    kept = (
+        "algorithm",
+        "started",
+        "finished",
+        "seeds",
+        "chosen",
+        "code",
+        "git",
+        "machine",
+        "versions",
+        "outputs",
+        *numbers,
+    )
 
     def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         return [_cell(block) | {name: block[name] for name in kept if name in block} for block in given]
