@@ -224,7 +224,9 @@ def test_hypotheses_are_told_with_both_cells_and_counted_by_verdict():
     counted, opened, told = study_sections.hypotheses_sentences(table)
     assert counted == ("Of 2 hypotheses written down before the runs, 1 are supported, 0 contradicted and 1 stay open.")
     assert "none is excluded" in opened
-    assert "“c”, is supported" in told
+    assert told.startswith("“c” is supported")
+    *_, same = study_sections.hypotheses_sentences(table.iloc[::-1])
+    assert same == told, "what is decided is told, wherever it stands"
     assert "differs by 49.0 [30.0, 60.0] points (p 0.009 " in told
     assert "8 of 10 runs solve the task with p, L2, α₀ = 50, 0 with p, none." in told
     assert "between 2.0 and 60.0 %" in told
@@ -258,3 +260,9 @@ def test_lengths_have_a_row_per_cell_and_length_with_every_interval():
     (shown,) = (grid := study_tables.lengths(pd.DataFrame([row]))).rows
     assert len(grid.headings) == len(shown)
     assert shown[3:5] == ["500", "50.0 [40.0, 60.0]"]
+    other = row | {"protocol": "tuned_terminal", "final_success_rate": 0.7}
+    told = study_sections.lengths_sentence(pd.DataFrame([row, other, row | {"steps": 50, "final_success_rate": 0.9}]))
+    assert told == (
+        "At the end of episodes of 500 steps the tip is on the target in: 70.0 [40.0, 60.0] % with tuned "
+        "terminal, none; 50.0 [40.0, 60.0] % with tuned, none."
+    )

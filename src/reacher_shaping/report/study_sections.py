@@ -68,6 +68,8 @@ def section(
         said += hypotheses_sentences(given["hypotheses"])
         said.append(say("study_sentences.exploratory"))
         first[say("study_tables.hypotheses")] = study_tables.hypotheses(given["hypotheses"])
+    if "lengths" in given:
+        said.append(lengths_sentence(given["lengths"]))
     if "effects" not in shown:
         said.append(best_sentence(given["cells"]))
     if "effects" in shown:
@@ -163,12 +165,12 @@ def with_unit(row: Mapping[Any, Any], metric: str, name: str, low: str, high: st
 
 
 def hypotheses_sentences(table: pd.DataFrame) -> list[str]:
-    """How many of our own hypotheses the runs support, contradict and leave open, and the first of them in numbers."""
+    """How many of our own hypotheses are supported, contradicted and left open; and in numbers the first decided one."""
     counts = table["verdict"].value_counts()
     named = {verdict: int(counts.get(verdict, 0)) for verdict in ("supported", "contradicted", "open")}
     texts = [say("study_sentences.hypotheses", hypotheses=len(table), **named)]
     texts += [say("study_sentences.hypotheses_open")] if named["open"] else []
-    row = table.iloc[0].to_dict()
+    row = table.iloc[int((table["verdict"] != "open").to_numpy().argmax())].to_dict()
     shown = {f"solved_{side}": round(row[f"solved_{side}"] * row["runs"]) for side in ("a", "b")}
     shown |= {end: f"{100 * row[f'{end}_a']:.1f}" for end in ("least", "greatest")}
     told = say(
@@ -183,6 +185,23 @@ def hypotheses_sentences(table: pd.DataFrame) -> list[str]:
         **shown,
     )
     return [*texts, told]
+
+
+def lengths_sentence(lengths: pd.DataFrame) -> str:
+    """Where the tip is at the end of the longest episodes, by cell, the highest share first."""
+    longest = lengths[lengths["steps"] == lengths["steps"].max()].sort_values("final_success_rate", ascending=False)
+    shares = [
+        say(
+            "study_sentences.length",
+            share=interval(
+                row, "final_success_rate", "final_success_rate_low", "final_success_rate_high",
+                *decimals("final_success_rate"),
+            ),
+            cell=f"{protocol_label(row['protocol'])}, {variant_label(row['variant'])}",
+        )
+        for row in longest.to_dict("records")
+    ]  # fmt: skip
+    return say("study_sentences.lengths", steps=int(longest["steps"].max()), shares="; ".join(shares))
 
 
 def best_sentence(cells: pd.DataFrame) -> str:
