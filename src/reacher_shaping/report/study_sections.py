@@ -165,7 +165,7 @@ def with_unit(row: Mapping[Any, Any], metric: str, name: str, low: str, high: st
 
 
 def hypotheses_sentences(table: pd.DataFrame) -> list[str]:
-    """How many of our own hypotheses are supported, contradicted and left open; and in numbers the first decided one."""
+    """How many of our own hypotheses are supported, contradicted and left open; the first decided one in numbers."""
     counts = table["verdict"].value_counts()
     named = {verdict: int(counts.get(verdict, 0)) for verdict in ("supported", "contradicted", "open")}
     texts = [say("study_sentences.hypotheses", hypotheses=len(table), **named)]
