@@ -59,7 +59,8 @@ def test_a_study_has_the_tables_that_it_asks_for():
     def having(table):
         return {name for name, own in tables.items() if table in own}
 
-    assert having("hypotheses") == having("takeoff") == having("targets") == set(LEDGERS) == {"sparse", "weights"}
+    assert having("hypotheses") == set(LEDGERS) == {"sparse", "weights", "ceiling"}
+    assert having("takeoff") == having("targets") == having("hypotheses")
     assert "targets" not in tables_of(study, "tasks", {"tasks"}), "no targets in Reacher's plane"
     assert having("lengths") == having("long_episodes") == {"main", "long"}
     assert having("effects") == {"attribution", "ablation"}
