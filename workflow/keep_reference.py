@@ -12,7 +12,8 @@ keeps the report of the reference run, as `make report` builds it where there ar
 and one PDF to read without building anything, and for a static host to serve as they are.
 
 The folder is made anew beside the old one and takes its place whole; what targets of their own make and `results/` does
-not have, further studies, peers and the search, stays as it was kept. Ends with 1, and changes nothing, where something
+not have, further studies, peers and the search, stays as it was kept, and so does the main study beside a further one
+that was made alone. Ends with 1, and changes nothing, where something
 would be lost or a block cannot be traced to a commit; --force keeps the run all the same, and says what is against it.
 """
 
@@ -38,9 +39,9 @@ from reacher_shaping.storage.reference import (
     copy_kept,
     keep_policies,
     keep_tables,
-    manifest,
     objections,
     published_bits,
+    records,
     replaced,
 )
 from reacher_shaping.storage.tables import TABLES
@@ -48,6 +49,10 @@ from reacher_shaping.storage.tables import TABLES
 RESULTS, KEPT, README = Path("results"), Path("report/reference"), Path("README.md")
 BUILT, SITE = Path("build/reference/report"), Path("report/site")
 FIGURE = "headline.svg"
+OPTIONAL = tuple(TABLES[name].file for name in ("peers", "trials"))
+"""What a study may have, by targets of its own."""
+OF_MAIN = ("grid", "seeds", "seeds_per_block", "root_seed", "evaluation")
+"""Settings that are the main study's alone."""
 
 
 def manifests(study: Study, cells: Iterable[Cell], seeds: int) -> list[dict[str, Any]]:
@@ -66,35 +71,58 @@ def manifests(study: Study, cells: Iterable[Cell], seeds: int) -> list[dict[str,
 
 def write_folder(study: Study, folder: Path) -> tuple[dict[str, Any], list[str]]:
     """Write all of the reference run into an empty folder; return its manifest, and what stays as it was kept."""
-    blocks = manifests(study, study.cells, study.seeds)
-    write_json(folder / "bits.json", published_bits(blocks))
     hypotheses = outputs.ledgers(yaml.safe_load(Path("report/hypotheses.yaml").read_text(encoding="utf-8")))
+    asked = {name: outputs.tables_of(study, name, hypotheses) for name in study.studies}
     further = {}
-    for name, own in study.studies.items():
-        tables, place = outputs.tables_of(study, name, hypotheses), outputs.folder(name)
-        if name != MAIN and not all((RESULTS / place / file).exists() for file in tables.values()):
-            continue
-        keep_tables(RESULTS / place, folder / place, tables)
-        if name != MAIN:
-            further[name] = manifests(study, study.cells_of[name], own.seeds)
+    for name, tables in asked.items():
+        place = outputs.folder(name)
+        if all((RESULTS / place / file).exists() for file in tables.values()):
+            keep_tables(RESULTS / place, folder / place, tables)
+            further[name] = manifests(study, study.cells_of[name], study.studies[name].seeds)
     keep_policies(RESULTS, folder, KEPT)
-    figure = Path("figures/figure_2.svg")
-    check_seal(figure)
-    shutil.copyfile(figure, folder / FIGURE)
-    peers = [read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))]
-    record = manifest(study.model_dump(mode="json"), settings_hash(study), blocks, further, peers)
+    main = further.pop(MAIN, None)
+    if main is None and (not further or not (KEPT / "manifest.json").exists()):
+        keep_tables(RESULTS, folder, asked[MAIN])  # says which is missing
+    if main is None:
+        record = keep_main(study, folder)
+    else:
+        write_json(folder / "bits.json", published_bits(main))
+        figure = Path("figures/figure_2.svg")
+        check_seal(figure)
+        shutil.copyfile(figure, folder / FIGURE)
+        record = {"blocks": records(main)}
+    record |= {"study": study.model_dump(mode="json"), "settings_hash": settings_hash(study)}
+    record["experiments"] = {name: records(blocks) for name, blocks in further.items()}
+    record["peers"] = records([read_json(path) for path in sorted(RESULTS.glob("**/peers/*/seed*.json"))])
     others = keep_others(study, folder, record) if (KEPT / "manifest.json").exists() else []
     record["tables"] = checksums(folder)
     write_json(folder / "manifest.json", record)
     return record, others
 
 
+def keep_main(study: Study, folder: Path) -> dict[str, Any]:
+    """Copy the main study as it was kept; return the records of its blocks.
+
+    Raises ValueError where today's configuration has other settings for anything that was kept.
+    """
+    record, now = read_json(KEPT / "manifest.json"), study.model_dump(mode="json")
+    before = record["study"]
+    other = [name for name in OF_MAIN if before[name] != now[name]]
+    for kind in ("protocols", "variants"):
+        other += [f"{kind}.{name}" for name, settings in before[kind].items() if now[kind].get(name) != settings]
+    if other:
+        raise ValueError(f"results/ lacks the main study, and the one that is kept has another {', '.join(other)}")
+    for path in KEPT.iterdir():
+        if path.is_file() and path.name not in (*OPTIONAL, "manifest.json"):
+            copy_kept(KEPT, folder, path.name)
+    return {"blocks": record["blocks"]}
+
+
 def keep_others(study: Study, folder: Path, record: dict[str, Any]) -> list[str]:
     """Add what targets of their own make and were not asked for here, as it was kept, to `record` too; return what."""
     before = read_json(KEPT / "manifest.json")
     names = [name for name in study.experiments if name in before["experiments"] and name not in record["experiments"]]
-    files = [TABLES[name].file for name in ("peers", "trials")]
-    files = [file for file in files if (KEPT / file).exists() and not (folder / file).exists()]
+    files = [file for file in OPTIONAL if (KEPT / file).exists() and not (folder / file).exists()]
     for place in (*map(outputs.folder, names), *files):
         copy_kept(KEPT, folder, place)
     record["experiments"] |= {name: before["experiments"][name] for name in names}

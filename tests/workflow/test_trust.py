@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from project import ROOT, Project
 
+from reacher_shaping.settings.study import read_settings
 from reacher_shaping.storage.files import read_json, seal_of, sha256, write_json
 from reacher_shaping.storage.reference import checksums
 
@@ -253,3 +254,30 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     assert readme.read_text() != text
     (kept / "claims.csv").write_text("edited")
     assert "report/reference/claims.csv: has changed since it was made" in copy.python("workflow/verify.py").stdout
+
+
+def test_further_study_made_alone_joins_the_reference_run(copy, toy_settings):
+    kept = copy.folder / "report/reference"
+    shutil.copy(ROOT / "README.md", copy.folder / "README.md")
+    assert keep(copy, "--force").returncode == 0
+    before, record = checksums(kept), read_json(kept / "manifest.json")
+    settings = read_settings(copy.folder / "config.yaml")
+    again = {"title": "Again", "question": "Is it?", "seeds": 2, "grid": [toy_settings["grid"][0] | {"group": "extra"}]}
+    with copy.configured(experiments=settings["experiments"] | {"again": again}):
+        copy.run("--", "again")
+        for path in (copy.folder / "results").iterdir():
+            if path.is_file():
+                path.unlink()
+        with copy.configured(seeds=3):
+            refused = keep(copy)
+        done = keep(copy, "--force")  # a test's blocks are of no commit
+    assert refused.returncode == 1
+    assert refused.stderr == "results/ lacks the main study, and the one that is kept has another seeds\n"
+    assert done.returncode == 0, done.stderr
+    now = read_json(kept / "manifest.json")
+    assert before.items() <= checksums(kept).items()
+    assert (kept / "experiments/again/cells.parquet").exists()
+    assert now["tables"] == checksums(kept)
+    assert now["blocks"] == record["blocks"]
+    assert now["experiments"].keys() == record["experiments"].keys() | {"again"}
+    assert sorted(map(str, now["peers"])) == sorted(map(str, record["peers"]))

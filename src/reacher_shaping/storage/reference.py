@@ -135,17 +135,8 @@ def keep_policies(results: Path, kept: Path, before: Path) -> None:
         write_json(kept / POLICIES / "policies.json", shown)
 
 
-def manifest(
-    settings: Mapping[str, Any],
-    settings_hash: str,
-    blocks: Sequence[Mapping[str, Any]],
-    further: Mapping[str, Sequence[Mapping[str, Any]]],
-    peers: Sequence[Mapping[str, Any]],
-) -> dict[str, Any]:
-    """Return what the reference run was: settings, and the record of each block, further study's block and peer.
-
-    The records are without their inputs; each block's names its cell.
-    """
+def records(manifests: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return what a reference run tells of blocks or peers: manifests without inputs; a block's names its cell."""
     numbers = ("env_steps", "env_steps_per_second", "wall_seconds", "cpu_seconds", "threads", "kernels", "core_type")
     kept = (
         "algorithm",
@@ -160,17 +151,7 @@ def manifest(
         "outputs",
         *numbers,
     )
-
-    def records(given: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-        return [_cell(block) | {name: block[name] for name in kept if name in block} for block in given]
-
-    return {
-        "study": settings,
-        "settings_hash": settings_hash,
-        "blocks": records(blocks),
-        "experiments": {name: records(given) for name, given in further.items()},
-        "peers": records(peers),
-    }
+    return [_cell(one) | {name: one[name] for name in kept if name in one} for one in manifests]
 
 
 def _cell(block: Mapping[str, Any]) -> dict[str, Any]:
