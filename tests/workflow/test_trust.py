@@ -235,10 +235,15 @@ def test_reference_run_is_never_half_replaced_and_not_by_a_toy_unasked(copy):
     record = read_json(kept / "manifest.json")
     assert record["tables"] == checksums(kept)
     assert "Kept all the same: it has 4 runs of the main study" in done.stderr
-    further = {name: total for name, total in before.items() if name.startswith("experiments/released/")}
+    further = {
+        name: total
+        for name, total in before.items()
+        if name.startswith(("experiments/released/", "experiments/tuned/search/"))
+    }
     assert further
     assert further.items() <= checksums(kept).items(), "a study that was not made here stays"
     assert record["experiments"]["released"] == earlier["released"]
+    assert len(record["peers"]) > 0, "those of the studies that stay"
     assert record["blocks"][2]["cell"] == {
         "protocol": "paper",
         "variant": "decay200k_l2sq",

@@ -112,6 +112,23 @@ def asked_of_peers(study):
     ]
 
 
+def search_of(wildcards):
+    """The search of the study that a wildcard names."""
+    return STUDY.studies[study_of(wildcards)].search
+
+
+def searched(wildcards):
+    """The variants that it tries, by name."""
+    return {name: STUDY.variants[name] for name in search_of(wildcards).variants()}
+
+
+def code_of_search(wildcards):
+    """Hash of the code that it runs, with what any of its trials looks up by name."""
+    search, protocol = search_of(wildcards), STUDY.protocols[search_of(wildcards).protocol]
+    cells = [search.cell(protocol, STUDY.variants, {"variant": name}) for name in searched(wildcards)]
+    return code("search", tuple(sorted({name for cell in cells for name in cell.chosen_code})))
+
+
 def twins(cells):
     """By protocol, variants that it trains as another of the config: `decay_potential` overrides a variant's own."""
     found = {}
@@ -126,6 +143,10 @@ def twins(cells):
 
 
 PEERS = [path for path in ["results/peers.parquet"] if made(path)]  # an input only once it is there
+SEARCHES = {
+    name: f"results/{outputs.folder(name)}{TABLES['trials'].file}" for name, own in STUDY.studies.items() if own.search
+}
+SEARCHED = [path for path in SEARCHES.values() if made(path)]  # and these too
 MADE = [name for name in STUDY.studies if name == MAIN or all(made(path) for path in tables_of(name))]
 MADE_TABLES = [path for name in MADE for path in tables_of(name)]
 MADE_BLOCKS = [(STUDY.cells_of[name], STUDY.studies[name].seeds) for name in MADE]

@@ -1,4 +1,4 @@
-"""Search for the settings of the tuned protocol; an interrupted search goes on after its last trial."""
+"""Search for the settings of a protocol; an interrupted search goes on after its last trial."""
 
 import hashlib
 import json
@@ -16,16 +16,17 @@ from reacher_shaping.storage.files import read_table, write_table
 
 params = snakemake.params
 spec = Search.model_validate_json(params.search)
-protocol, variant = Protocol.model_validate_json(params.protocol), Variant.model_validate_json(params.variant)
+protocol = Protocol.model_validate_json(params.protocol)
+variants = {name: Variant.model_validate(own) for name, own in json.loads(params.variants).items()}
 evaluation = Evaluation.model_validate_json(params.evaluation)
 searched = json.dumps(spec.model_dump(exclude={"trials"}), sort_keys=True)  # more trials go on from fewer
-settings = [searched, params.protocol, params.variant, params.evaluation, params.code]
+settings = [searched, params.protocol, params.variants, params.evaluation, params.code]
 kept = Path("results/.checkpoints") / f"search-{hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:16]}.csv"
 
 
 def measure(values: search.Values) -> search.Values:
     """Train and evaluate one trial."""
-    cell = spec.cell(protocol, variant, values)
+    cell = spec.cell(protocol, variants, values)
     return search.score(
         cell, spec.seeds, episodes=evaluation.episodes, radius=cell.protocol.environment.radius(evaluation.radius)
     )
@@ -37,6 +38,6 @@ with logged(snakemake) as say:
     for trials in search.trials(spec, measure, done):
         write_table(kept, trials, schemas.TRIALS, sealed=False)
         for line in meter.lines(len(trials)):
-            say(f"{line}, best return {trials['mean_return'].max():.3f}")
+            say(f"{line}, best {spec.maximise} {trials[spec.maximise].max():.3f}")
     found = read_table(kept, schemas.TRIALS).head(spec.trials)  # kept: more trials later go on from these
     write_table(snakemake.output[0], found, schemas.TRIALS)

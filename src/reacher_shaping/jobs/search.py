@@ -1,7 +1,7 @@
-"""Search for the settings of the `tuned` protocol: Optuna's tree-structured Parzen estimator, one trial at a time.
+"""Search for the settings of a protocol: Optuna's tree-structured Parzen estimator, one trial at a time.
 
 The trials' seeds, resets and noise come from a root of their own, so nothing of the runs that the study later reports
-was seen here. The score is the mean return of the environment's own reward: success can be had in passing.
+was seen here. The score is a measure of the environment's own reward, never of the shaped one.
 """
 
 import math
@@ -13,7 +13,7 @@ import pandas as pd
 
 from reacher_shaping.evaluation.evaluate import evaluate
 from reacher_shaping.settings.cell import Cell
-from reacher_shaping.settings.search import Search
+from reacher_shaping.settings.search import VARIANT, Search
 from reacher_shaping.training.train import train
 
 Values = dict[str, Any]
@@ -60,30 +60,30 @@ def score(cell: Cell, seeds: int, *, episodes: int, radius: float) -> dict[str, 
 def trials(
     search: Search, measure: Callable[[Values], Values], done: pd.DataFrame | None = None
 ) -> Iterator[pd.DataFrame]:
-    """Yield the table of trials after each one: `trial`, the settings, and the measures.
+    """Yield the table of trials after each one: `trial`, `variant`, the settings, and the measures.
 
     Args:
         search: what is searched, and how long.
-        measure: the measures of a trial's settings; `mean_return` is maximised, and where it is not finite the trial
-            counts as the worst so far.
+        measure: the measures of a trial's settings; where the one to maximise is not finite the trial counts as the
+            worst so far.
         done: trials of an earlier call to go on from. A trial depends on its number and those before it alone, so an
             interrupted search ends like another.
     """
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    space = distributions(search)
+    space, goal = distributions(search), search.maximise
     rows: list[Values] = (
         [] if done is None else [{str(k): v for k, v in row.items()} for row in done.to_dict("records")]
     )
     while len(rows) < search.trials:
         sampler = optuna.samplers.TPESampler(seed=search.root_seed + len(rows), n_startup_trials=STARTUP)
         optimiser = optuna.create_study(direction="maximize", sampler=sampler)
-        worst = min((row["mean_return"] for row in rows if math.isfinite(row["mean_return"])), default=0.0)
+        worst = min((row[goal] for row in rows if math.isfinite(row[goal])), default=0.0)
         for row in rows:
-            value = row["mean_return"] if math.isfinite(row["mean_return"]) else worst
+            value = row[goal] if math.isfinite(row[goal]) else worst
             params = {path: _plain(row[path], space[path]) for path in space}
             optimiser.add_trial(optuna.trial.create_trial(params=params, distributions=space, value=value))
-        values = optimiser.ask(space).params
-        rows.append({"trial": len(rows)} | values | measure(values))
+        values = optimiser.ask(space).params if rows or not search.start else dict(search.start)
+        rows.append({"trial": len(rows), VARIANT: search.variant} | values | measure(values))
         yield pd.DataFrame(rows)
 
 

@@ -48,6 +48,11 @@ class Settings(BaseModel):
         return data
 
 
+def to_tuple(value: Any) -> Any:
+    """A list as a tuple, which settings hold; anything else as it is."""
+    return tuple(value) if isinstance(value, list) else value
+
+
 def plain(number: float) -> str:
     """A number in the shortest plain notation, without exponent or trailing zeros: 1.0 -> `1`, 0.5 -> `0.5`."""
     return format(Decimal(repr(number)).normalize(), "f")

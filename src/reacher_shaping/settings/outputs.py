@@ -71,6 +71,7 @@ def features(study: Study, name: str, hypotheses: Collection[str]) -> frozenset[
         "switches": own.switches is not None,
         "peers": own.peers is not None,
         "lengths": own.lengths,
+        "search": own.search is not None,
         "hypotheses": name in hypotheses,
         "targets": name in hypotheses and all(cell.protocol.environment.task == "reacher" for cell in cells),
     }

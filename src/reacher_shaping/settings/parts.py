@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from reacher_shaping.settings.base import WHOLE, Count, Name, Positive, Seed, Settings
+from reacher_shaping.settings.base import WHOLE, Count, Name, Positive, Seed, Settings, to_tuple
 from reacher_shaping.settings.cell import Alpha0
+from reacher_shaping.settings.search import Search
 
 
 class Evaluation(Settings):
@@ -59,11 +60,6 @@ class Row(Settings):
         return {key: to_tuple(value) for key, value in data.items()} if isinstance(data, Mapping) else data
 
 
-def to_tuple(value: Any) -> Any:
-    """A list as a tuple, which settings hold; anything else as it is."""
-    return tuple(value) if isinstance(value, list) else value
-
-
 Rows = Annotated[tuple[Row, ...], Field(min_length=1), BeforeValidator(to_tuple)]
 Names = Annotated[tuple[Name, ...], Field(min_length=1), BeforeValidator(to_tuple)]
 
@@ -94,7 +90,7 @@ class Switches(Settings):
 
 
 class Experiment(Settings):
-    """A further study beside the main one, a target of its name: runs per cell, cells, and perhaps peers."""
+    """A further study beside the main one, a target of its name: runs per cell, cells, perhaps peers and a search."""
 
     title: str = ""
     """Heading of the study in the report."""
@@ -112,6 +108,8 @@ class Experiment(Settings):
     """Two protocols and the differences between them, each alone or taken back."""
     peers: Peers | None = None
     """Stable-Baselines3's algorithms to hold the unshaped cells against."""
+    search: Search | None = None
+    """The search for settings of its protocol, on seeds of its own; an optional target."""
 
     @model_validator(mode="after")
     def _there_are_cells(self) -> Self:

@@ -82,8 +82,6 @@ class Study(Settings):
     """Stable-Baselines3's algorithms without shaping, an optional target."""
     experiments: dict[Name, Experiment] = Field(default_factory=dict)
     """Further studies, each a target of its name."""
-    search: Search | None = None
-    """The search for a protocol's settings, an optional target."""
     sources: dict[str, str] = Field(default_factory=dict)
     """Where each value is from, by its place such as `protocols.paper.ppo.discount`."""
 
@@ -106,7 +104,8 @@ class Study(Settings):
             raise ValueError(f"experiments: {MAIN!r} is the study beside it; allowed: any other name")
         for name, experiment in self.experiments.items():
             self._peers_have_partners(name, experiment)
-        self._search_is_possible()
+            if experiment.search:
+                self._search_is_possible(name, experiment.search)
         known: dict[str, Cell] = {}
         for name, own in self.designs.items():
             where, names = "grid" if name == MAIN else name, [cell.name for cell, _ in own]
@@ -159,18 +158,24 @@ class Study(Settings):
                     f"{protocol.name} {ours!r}; allowed: a protocol that has the same"
                 )
 
-    def _search_is_possible(self) -> None:
-        if self.search is None:
-            return
-        for key, known in (("protocol", self.protocols), ("variant", self.variants)):
-            if getattr(self.search, key) not in known:
-                value = getattr(self.search, key)
-                raise ValueError(f"search.{key} = {value!r} is unknown; allowed: {', '.join(known)}")
-        for values in self.search.corners():
+    def _search_is_possible(self, name: str, search: Search) -> None:
+        """Its names are known, every end of its space makes a cell, and its seeds are none that the study reports."""
+        where = f"experiments.{name}.search"
+        named = [("variant", variant) for variant in (search.variant, *search.variants())]
+        for key, value in [("protocol", search.protocol), *named]:
+            known = list(self.protocols if key == "protocol" else self.variants)
+            if value not in known:
+                raise ValueError(f"{where}.{key} = {value!r} is unknown; allowed: {', '.join(known)}")
+        if search.root_seed in {cell.root_seed for cell in self.cells_of[name]}:
+            raise ValueError(
+                f"{where}.root_seed = {search.root_seed} is that of the study's own runs; allowed: another, so that "
+                "these are fresh"
+            )
+        for values in search.corners():
             try:
-                self.search.cell(self.protocols[self.search.protocol], self.variants[self.search.variant], values)
+                search.cell(self.protocols[search.protocol], self.variants, values)
             except ConfigError as error:
-                raise ValueError(str(error)) from None
+                raise ValueError(f"{where}: {error}") from None
 
     @cached_property
     def studies(self) -> dict[str, Experiment]:

@@ -63,7 +63,7 @@ AGREEMENT = Table(
     {"algorithm": TEXT, "budget": INTEGER, "metric": TEXT, "our_seeds": INTEGER, "their_seeds": INTEGER}, measures=True
 )
 LOGS = Table({**_CELL, "seed": INTEGER}, measures=True)
-TRIALS = Table({"trial": INTEGER}, measures=True)
+TRIALS = Table({"trial": INTEGER, "variant": TEXT}, measures=True)
 VARIANCE = Table({**_CELL, "seeds": INTEGER}, measures=True)
 POWER = Table({**_CELL, "seeds": INTEGER}, measures=True)
 LOTTERY = Table({"statement": TEXT}, measures=True)

@@ -226,7 +226,9 @@ TABLES = {
     "peers": Entry(
         "peers.parquet", schemas.PEERS, "a run of another algorithm", "gather_peers", of="main", always=False
     ),
-    "trials": Entry("search/trials.csv", schemas.TRIALS, "a trial of the search", "search", of="main", always=False),
+    "trials": Entry(
+        "search/trials.csv", schemas.TRIALS, "a trial of the search", "search_settings", of="search", always=False
+    ),
     "effects": Entry(
         "effects.csv",
         schemas.EFFECTS,

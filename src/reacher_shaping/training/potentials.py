@@ -14,6 +14,8 @@ from reacher_shaping.training.records import Potential, State, Transitions
 _Array = NDArray[np.float64]
 _KNOTS = np.array([0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64])
 """m; between them a learned potential is a line, beyond the last it is constant."""
+_NEAR = 0.01
+"""m; below it the logarithm of a distance rises no more."""
 
 
 def _between(distance: _Array) -> tuple[NDArray[np.int64], _Array]:
@@ -60,6 +62,16 @@ def l2(distance: _Array) -> _Array:
 def l2sq(distance: _Array) -> _Array:
     """Return -d^2 (paper, section 3.3)."""
     return np.negative(np.square(distance))
+
+
+def sqrt(distance: _Array) -> _Array:
+    """Return -sqrt(d): the steeper, the nearer to the goal."""
+    return np.negative(np.sqrt(distance))
+
+
+def log(distance: _Array) -> _Array:
+    """Return -log(d + 0.01 m): twenty times as steep at the goal as 0.2 m from it."""
+    return np.negative(np.log(distance + _NEAR))
 
 
 learned = Potential(
