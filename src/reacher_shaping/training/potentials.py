@@ -14,8 +14,7 @@ from reacher_shaping.training.records import Potential, State, Transitions
 _Array = NDArray[np.float64]
 _KNOTS = np.array([0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64])
 """m; between them a learned potential is a line, beyond the last it is constant."""
-_NEAR = 0.01
-"""m; below it the logarithm of a distance rises no more."""
+_NEAR = 0.01  # m; much nearer, the logarithm of the distance rises no more
 
 
 def _between(distance: _Array) -> tuple[NDArray[np.int64], _Array]:
